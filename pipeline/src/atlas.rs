@@ -1,0 +1,89 @@
+//! Charts: parts of a surface that a disk can carry.
+
+use crate::id::{ChartId, FaceId, HalfEdgeId, VertexId};
+use crate::mesh::{EdgeTable, TriangleShape};
+
+/// A connected, oriented part of a surface of genus 0 whose boundary loops are simple and share no vertex.
+/// Made by [`crate::decompose`].
+#[derive(Clone, Debug)]
+pub struct Chart {
+    pub(crate) id: ChartId,
+    pub(crate) vertices: Vec<VertexId>,
+    pub(crate) faces: Vec<FaceId>,
+    pub(crate) triangles: Vec<[VertexId; 3]>,
+    pub(crate) shapes: Vec<TriangleShape>,
+    pub(crate) flagged: Vec<bool>,
+    pub(crate) edges: EdgeTable,
+    pub(crate) outer: Vec<HalfEdgeId>,
+    pub(crate) holes: Vec<Vec<HalfEdgeId>>,
+}
+
+impl Chart {
+    /// The number of this chart in its atlas.
+    pub fn id(&self) -> ChartId {
+        self.id
+    }
+
+    /// Per vertex of the chart, the vertex of the surface.
+    pub fn vertices(&self) -> &[VertexId] {
+        &self.vertices
+    }
+
+    /// Per triangle of the chart, the triangle of the surface.
+    pub fn faces(&self) -> &[FaceId] {
+        &self.faces
+    }
+
+    /// The triangles, by vertices of the chart.
+    pub fn triangles(&self) -> &[[VertexId; 3]] {
+        &self.triangles
+    }
+
+    /// The mollified shape of each triangle.
+    pub fn shapes(&self) -> &[TriangleShape] {
+        &self.shapes
+    }
+
+    /// Per triangle, whether mollification changed its area by more than 1 %.
+    pub fn flagged(&self) -> &[bool] {
+        &self.flagged
+    }
+
+    /// The edges, numbered within the chart.
+    pub fn edges(&self) -> &EdgeTable {
+        &self.edges
+    }
+
+    /// The outer boundary loop, with the chart on its left.
+    pub fn outer(&self) -> &[HalfEdgeId] {
+        &self.outer
+    }
+
+    /// The loops around holes, each with the chart on its left.
+    pub fn holes(&self) -> &[Vec<HalfEdgeId>] {
+        &self.holes
+    }
+
+    /// The vertex at which `h` begins.
+    pub fn from(&self, h: HalfEdgeId) -> VertexId {
+        self.triangles[h.face().index()][h.side()]
+    }
+
+    /// The length of the edge along `h`, mollified.
+    pub fn length(&self, h: HalfEdgeId) -> f64 {
+        self.shapes[h.face().index()].lengths[h.side()]
+    }
+}
+
+/// The charts of a surface; together they hold every triangle once.
+#[derive(Clone, Debug)]
+pub struct Atlas {
+    pub(crate) charts: Vec<Chart>,
+}
+
+impl Atlas {
+    /// The charts, in the order of their ids.
+    pub fn charts(&self) -> &[Chart] {
+        &self.charts
+    }
+}

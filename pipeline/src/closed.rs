@@ -1,0 +1,170 @@
+//! A chart with its holes closed by virtual fans, and the nodes of its quadratic elements.
+//!
+//! Every hole gets a virtual vertex, joined to the loop by isosceles triangles with legs r = max(P / 2 pi,
+//! l_max / sqrt 3) (P the perimeter, l_max the longest edge), so that every triangle inequality holds. The fans
+//! take part in the linear and quadratic solves, which keeps holes round and most triangles valid; they are no
+//! part of the result.
+
+use crate::atlas::Chart;
+use crate::id::{HalfEdgeId, VertexId};
+use crate::mesh::{EdgeTable, TriangleShape};
+use std::f64::consts::TAU;
+
+/// A chart without holes: its own triangles first, then the fans.
+///
+/// Vertices: those of the chart, then one centre per hole. Nodes of the quadratic elements: vertices of the chart
+/// `0..V`, mid-edge nodes of the chart `V..N`, centres, mid-edge nodes of the spokes.
+#[derive(Clone, Debug)]
+pub struct ClosedChart {
+    triangles: Vec<[VertexId; 3]>,
+    shapes: Vec<TriangleShape>,
+    edges: EdgeTable,
+    own_triangles: usize,
+    own_vertices: usize,
+    own_edges: usize,
+    holes: usize,
+    outer: Vec<HalfEdgeId>,
+    loops: Vec<Vec<HalfEdgeId>>,
+}
+
+impl ClosedChart {
+    /// Closes the holes of `chart`.
+    pub fn new(chart: &Chart) -> Self {
+        let own_vertices = chart.vertices().len();
+        let mut triangles = chart.triangles().to_vec();
+        let mut shapes = chart.shapes().to_vec();
+        for (k, hole) in chart.holes().iter().enumerate() {
+            let centre = VertexId::at(own_vertices + k);
+            let lengths: Vec<f64> = hole.iter().map(|h| chart.length(*h)).collect();
+            let longest = lengths.iter().fold(0.0_f64, |m, l| m.max(*l));
+            let leg = (lengths.iter().sum::<f64>() / TAU).max(longest / 3.0_f64.sqrt());
+            for (h, length) in hole.iter().zip(&lengths) {
+                let [from, to] = ends(&triangles, *h);
+                triangles.push([to, from, centre]);
+                shapes.push(TriangleShape { lengths: [*length, leg, leg] });
+            }
+        }
+        Self {
+            edges: EdgeTable::new(&triangles),
+            triangles,
+            shapes,
+            own_triangles: chart.triangles().len(),
+            own_vertices,
+            own_edges: chart.edges().len(),
+            holes: chart.holes().len(),
+            outer: chart.outer().to_vec(),
+            loops: chart.holes().to_vec(),
+        }
+    }
+
+    /// All triangles, those of the fans last.
+    pub fn triangles(&self) -> &[[VertexId; 3]] {
+        &self.triangles
+    }
+
+    /// The shape of every triangle.
+    pub fn shapes(&self) -> &[TriangleShape] {
+        &self.shapes
+    }
+
+    /// All edges; those of the chart have the numbers they have there.
+    pub fn edges(&self) -> &EdgeTable {
+        &self.edges
+    }
+
+    /// How many of the triangles belong to the chart.
+    pub fn own_triangles(&self) -> usize {
+        self.own_triangles
+    }
+
+    /// How many of the vertices belong to the chart.
+    pub fn own_vertices(&self) -> usize {
+        self.own_vertices
+    }
+
+    /// How many of the nodes belong to the chart: its vertices and its edges.
+    pub fn own_nodes(&self) -> usize {
+        self.own_vertices + self.own_edges
+    }
+
+    /// The number of vertices, centres of fans included.
+    pub fn vertex_count(&self) -> usize {
+        self.own_vertices + self.holes
+    }
+
+    /// The number of nodes, those of the fans included.
+    pub fn node_count(&self) -> usize {
+        self.vertex_count() + self.edges.len()
+    }
+
+    /// The outer loop, with the chart on its left.
+    pub fn outer(&self) -> &[HalfEdgeId] {
+        &self.outer
+    }
+
+    /// The loops around the holes, with the chart on their left.
+    pub fn loops(&self) -> &[Vec<HalfEdgeId>] {
+        &self.loops
+    }
+
+    /// The node at a vertex.
+    pub fn vertex_node(&self, v: VertexId) -> usize {
+        if v.index() < self.own_vertices { v.index() } else { v.index() + self.own_edges }
+    }
+
+    /// The node at the centre of hole `k`.
+    pub fn centre_node(&self, k: usize) -> usize {
+        self.own_nodes() + k
+    }
+
+    /// The node in the middle of the edge along `h`.
+    pub fn mid_node(&self, h: HalfEdgeId) -> usize {
+        let e = self.edges.edge(h).index();
+        if e < self.own_edges { self.own_vertices + e } else { self.vertex_count() + e }
+    }
+
+    /// The six nodes of a triangle: vertices, then the middles of the edges 01, 12, 20.
+    pub fn nodes(&self, face: usize) -> [usize; 6] {
+        let t = self.triangles[face];
+        let side = |k| self.mid_node(HalfEdgeId::at(3 * face + k));
+        let corner = |k: usize| self.vertex_node(t[k]);
+        [corner(0), corner(1), corner(2), side(0), side(1), side(2)]
+    }
+
+    /// The vertices at both ends of `h`.
+    pub fn ends(&self, h: HalfEdgeId) -> [VertexId; 2] {
+        ends(&self.triangles, h)
+    }
+}
+
+fn ends(triangles: &[[VertexId; 3]], h: HalfEdgeId) -> [VertexId; 2] {
+    let t = triangles[h.face().index()];
+    [t[h.side()], t[(h.side() + 1) % 3]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{decompose, repair, shapes};
+
+    #[test]
+    fn fans_close_every_hole_and_nodes_are_numbered_once() {
+        let mesh = repair(&shapes::disk_with_holes(13, 2), &Default::default()).expect("a surface").mesh;
+        let atlas = decompose(&mesh).expect("one chart");
+        let chart = &atlas.charts()[0];
+        let closed = ClosedChart::new(chart);
+        let chi = closed.vertex_count() as i64 - closed.edges().len() as i64 + closed.triangles().len() as i64;
+        assert_eq!(chi, 1, "a disk");
+        let mut seen = vec![false; closed.node_count()];
+        for f in 0..closed.triangles().len() {
+            closed.nodes(f).into_iter().for_each(|n| seen[n] = true);
+            let own = f < closed.own_triangles();
+            assert!(!own || closed.nodes(f).iter().all(|n| *n < closed.own_nodes()));
+        }
+        assert!(seen.iter().all(|s| *s));
+        for h in (0..3 * closed.own_triangles()).map(HalfEdgeId::at) {
+            assert_eq!(closed.edges().edge(h), chart.edges().edge(h));
+        }
+        assert!(closed.shapes().iter().all(|s| s.slack() > 0.0));
+    }
+}

@@ -1,0 +1,13 @@
+pub mod atlas;
+pub mod closed;
+mod decompose;
+pub mod grid;
+pub mod id;
+pub mod mesh;
+pub mod repair;
+pub mod shapes;
+pub mod space;
+mod sparse;
+mod union_find;
+pub use decompose::decompose;
+pub use repair::repair;

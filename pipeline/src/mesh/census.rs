@@ -1,0 +1,236 @@
+//! Counting: what kind of surface is this?
+
+use super::EdgeTable;
+use crate::id::{FaceId, HalfEdgeId, VertexId};
+use crate::union_find::UnionFind;
+
+/// The numbers that tell what a triangulated surface is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Census {
+    /// Vertices that a triangle uses.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Edges.
+    pub edges: usize,
+    /// Parts connected through edges.
+    pub components: usize,
+    /// Closed curves of boundary edges.
+    pub boundary_loops: usize,
+    /// Euler number: vertices - edges + triangles.
+    pub euler: i64,
+    /// Total genus (handles); `None` where the surface is not orientable or has non-manifold edges.
+    pub genus: Option<u64>,
+    /// Whether every component can be oriented.
+    pub orientable: bool,
+    /// Edges at which three or more triangles meet.
+    pub nonmanifold_edges: usize,
+    /// Vertices at which several sheets touch.
+    pub nonmanifold_vertices: usize,
+    /// Edges whose two triangles disagree about the direction.
+    pub inconsistent_edges: usize,
+}
+
+/// The sheets around each vertex: corners of triangles, grouped where two triangles share an edge at the vertex.
+#[derive(Clone, Debug)]
+pub struct Umbrellas {
+    /// Per corner (`3 * face + corner`), the umbrella it belongs to; numbered in the order of first corners.
+    pub of_corner: Vec<u32>,
+    /// How many there are.
+    pub count: usize,
+}
+
+impl Umbrellas {
+    /// Groups the corners of `triangles`.
+    pub fn new(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Self {
+        let mut sets = UnionFind::new(3 * triangles.len());
+        for (_, sides) in edges.iter() {
+            if let [g, h] = *sides {
+                for (a, b) in matching_corners(triangles, g, h) {
+                    sets.unite(a, b);
+                }
+            }
+        }
+        let (of_corner, count) = sets.labels();
+        Self { of_corner, count }
+    }
+
+    /// The vertex of each umbrella.
+    pub fn vertices(&self, triangles: &[[VertexId; 3]]) -> Vec<VertexId> {
+        let mut vertices = vec![VertexId(0); self.count];
+        for (corner, &umbrella) in self.of_corner.iter().enumerate() {
+            vertices[umbrella as usize] = triangles[corner / 3][corner % 3];
+        }
+        vertices
+    }
+}
+
+/// The two pairs of corners that two half-edges along one edge share.
+fn matching_corners(triangles: &[[VertexId; 3]], g: HalfEdgeId, h: HalfEdgeId) -> [(usize, usize); 2] {
+    let corner = |e: HalfEdgeId| triangles[e.face().index()][e.side()];
+    let (from_g, to_g) = (g.index(), g.next().index());
+    let (from_h, to_h) = (h.index(), h.next().index());
+    if corner(g) == corner(h) { [(from_g, from_h), (to_g, to_h)] } else { [(from_g, to_h), (to_g, from_h)] }
+}
+
+/// Whether two half-edges along one edge run in opposite directions, as they do on an oriented surface.
+pub(crate) fn opposed(triangles: &[[VertexId; 3]], g: HalfEdgeId, h: HalfEdgeId) -> bool {
+    triangles[g.face().index()][g.side()] != triangles[h.face().index()][h.side()]
+}
+
+/// Per face, whether it must be flipped for its component to be oriented, relative to the component's first
+/// face; and per face its component through two-sided edges. Ends because each face is entered once.
+pub(crate) struct Orientation {
+    pub flip: Vec<bool>,
+    pub component: Vec<u32>,
+    pub orientable: bool,
+}
+
+pub(crate) fn orientation(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Orientation {
+    let unseen = u32::MAX;
+    let mut found =
+        Orientation { flip: vec![false; triangles.len()], component: vec![unseen; triangles.len()], orientable: true };
+    let mut stack = Vec::new();
+    let mut components = 0;
+    for seed in 0..triangles.len() {
+        if found.component[seed] != unseen {
+            continue;
+        }
+        found.component[seed] = components;
+        stack.push(FaceId::at(seed));
+        while let Some(face) = stack.pop() {
+            for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
+                let Some(twin) = edges.twin(h) else { continue };
+                let flip = found.flip[face.index()] ^ !opposed(triangles, h, twin);
+                let other = twin.face().index();
+                if found.component[other] == unseen {
+                    found.component[other] = components;
+                    found.flip[other] = flip;
+                    stack.push(twin.face());
+                } else {
+                    found.orientable &= found.flip[other] == flip;
+                }
+            }
+        }
+        components += 1;
+    }
+    found
+}
+
+impl Census {
+    /// Counts everything about `triangles`, whose corners are distinct.
+    pub fn new(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Self {
+        let umbrellas = Umbrellas::new(triangles, edges);
+        let (vertices, nonmanifold_vertices) = count_vertices(&umbrellas.vertices(triangles));
+        let orientable = orientation(triangles, edges).orientable;
+        let nonmanifold_edges = edges.iter().filter(|(_, s)| s.len() > 2).count();
+        let inconsistent = |s: &[HalfEdgeId]| matches!(*s, [g, h] if !opposed(triangles, g, h));
+        let components = count_components(triangles.len(), edges);
+        let boundary_loops = count_loops(edges, &umbrellas);
+        let cells = triangles.len() as i64 - edges.len() as i64;
+        // Sheets that only touch in a vertex are apart: the genus counts a vertex once per umbrella.
+        let handles = 2 * components as i64 - boundary_loops as i64 - (umbrellas.count as i64 + cells);
+        let closed_up = orientable && nonmanifold_edges == 0;
+        Self {
+            vertices,
+            triangles: triangles.len(),
+            edges: edges.len(),
+            components,
+            boundary_loops,
+            euler: vertices as i64 + cells,
+            genus: if closed_up { u64::try_from(handles / 2).ok() } else { None },
+            orientable,
+            nonmanifold_edges,
+            nonmanifold_vertices,
+            inconsistent_edges: edges.iter().filter(|(_, s)| inconsistent(s)).count(),
+        }
+    }
+
+    /// Whether the surface is a disk, or a disk with holes: what one chart can carry.
+    pub fn is_one_chart(&self) -> bool {
+        self.components == 1 && self.genus == Some(0) && self.boundary_loops > 0 && self.nonmanifold_edges == 0
+    }
+}
+
+/// The number of vertices, and of those with several umbrellas.
+fn count_vertices(umbrella_vertices: &[VertexId]) -> (usize, usize) {
+    let mut sorted = umbrella_vertices.to_vec();
+    sorted.sort_unstable();
+    let runs = sorted.chunk_by(|a, b| a == b);
+    runs.fold((0, 0), |(all, several), run| (all + 1, several + usize::from(run.len() > 1)))
+}
+
+fn count_components(faces: usize, edges: &EdgeTable) -> usize {
+    let mut sets = UnionFind::new(faces);
+    for (_, sides) in edges.iter() {
+        for pair in sides.windows(2) {
+            sets.unite(pair[0].face().index(), pair[1].face().index());
+        }
+    }
+    sets.labels().1
+}
+
+/// Boundary edges that end in the same umbrella belong to the same loop.
+fn count_loops(edges: &EdgeTable, umbrellas: &Umbrellas) -> usize {
+    let boundary: Vec<HalfEdgeId> = edges.iter().filter(|(_, s)| s.len() == 1).map(|(_, s)| s[0]).collect();
+    let mut sets = UnionFind::new(boundary.len());
+    let mut seen = vec![u32::MAX; umbrellas.count];
+    for (i, h) in boundary.iter().enumerate() {
+        for corner in [h.index(), h.next().index()] {
+            let last = &mut seen[umbrellas.of_corner[corner] as usize];
+            if *last != u32::MAX {
+                sets.unite(i, *last as usize);
+            }
+            *last = i as u32;
+        }
+    }
+    sets.labels().1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn census(triangles: &[[u32; 3]]) -> Census {
+        let triangles: Vec<_> = triangles.iter().map(|t| t.map(VertexId)).collect();
+        Census::new(&triangles, &EdgeTable::new(&triangles))
+    }
+
+    #[test]
+    fn a_tetrahedron_is_a_sphere_and_without_a_face_a_disk() {
+        let tetrahedron = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+        let sphere = census(&tetrahedron);
+        assert_eq!((sphere.euler, sphere.genus, sphere.boundary_loops), (2, Some(0), 0));
+        assert!(!sphere.is_one_chart());
+        assert!(census(&tetrahedron[..3]).is_one_chart());
+    }
+
+    #[test]
+    fn sheets_that_touch_in_a_vertex_are_two_components() {
+        let bow_tie = census(&[[0, 1, 2], [0, 3, 4]]);
+        assert_eq!((bow_tie.components, bow_tie.boundary_loops, bow_tie.nonmanifold_vertices), (2, 2, 1));
+        assert_eq!((bow_tie.euler, bow_tie.genus), (1, Some(0)));
+    }
+
+    #[test]
+    fn a_book_of_three_pages_is_not_manifold() {
+        let book = census(&[[0, 1, 2], [1, 0, 3], [0, 1, 4]]);
+        assert_eq!((book.nonmanifold_edges, book.genus, book.components), (1, None, 1));
+    }
+
+    #[test]
+    fn a_moebius_strip_cannot_be_oriented() {
+        let strip: Vec<_> = (0..5).map(|i| [i, (i + 1) % 5, (i + 2) % 5]).collect();
+        let moebius = census(&strip);
+        assert!(!moebius.orientable);
+        assert_eq!((moebius.boundary_loops, moebius.euler, moebius.genus), (1, 0, None));
+    }
+
+    #[test]
+    fn a_flipped_triangle_is_counted_as_inconsistent() {
+        let square = census(&[[0, 1, 2], [0, 3, 2]]);
+        assert_eq!((square.inconsistent_edges, square.orientable), (1, true));
+        assert_eq!(census(&[[0, 1, 2], [2, 3, 0]]).inconsistent_edges, 0);
+        assert_eq!(census(&[[0, 1, 2], [0, 2, 3]]).inconsistent_edges, 0);
+    }
+}

@@ -1,0 +1,123 @@
+//! Which triangles meet along which edge. The table never sees positions, and takes any triangulation:
+//! non-manifold and inconsistently oriented ones too.
+
+use crate::id::{EdgeId, HalfEdgeId, VertexId};
+
+/// The edges of a triangulation, each with the half-edges that run along it in either direction.
+///
+/// Edges are numbered in the order in which the half-edges 0, 1, 2, ... first meet them.
+#[derive(Clone, Debug)]
+pub struct EdgeTable {
+    edge_of: Vec<EdgeId>,
+    starts: Vec<u32>,
+    sides: Vec<HalfEdgeId>,
+}
+
+impl EdgeTable {
+    /// Finds the edges of `triangles`, whose corners are distinct. Costs one sort of the half-edges.
+    pub fn new(triangles: &[[VertexId; 3]]) -> Self {
+        let mut keyed: Vec<(u64, u32)> = Vec::with_capacity(3 * triangles.len());
+        for t in triangles {
+            for k in 0..3 {
+                let (a, b) = (t[k].0, t[(k + 1) % 3].0);
+                keyed.push((u64::from(a.min(b)) << 32 | u64::from(a.max(b)), keyed.len() as u32));
+            }
+        }
+        keyed.sort_unstable();
+        let mut group_of = vec![0_u32; keyed.len()];
+        let mut groups: Vec<(u32, u32)> = Vec::new();
+        for chunk in keyed.chunk_by(|a, b| a.0 == b.0) {
+            let start = groups.last().map_or(0, |g| g.1);
+            chunk.iter().for_each(|&(_, h)| group_of[h as usize] = groups.len() as u32);
+            groups.push((start, start + chunk.len() as u32));
+        }
+        Self::numbered(&keyed, &group_of, &groups)
+    }
+
+    /// Numbers the groups of equal edges by their first half-edge.
+    fn numbered(keyed: &[(u64, u32)], group_of: &[u32], groups: &[(u32, u32)]) -> Self {
+        let unseen = EdgeId(u32::MAX);
+        let mut number = vec![unseen; groups.len()];
+        let mut table = Self { edge_of: Vec::with_capacity(keyed.len()), starts: vec![0], sides: Vec::new() };
+        for &group in group_of {
+            let (start, end) = groups[group as usize];
+            if number[group as usize] == unseen {
+                number[group as usize] = EdgeId::at(table.starts.len() - 1);
+                table.sides.extend(keyed[start as usize..end as usize].iter().map(|k| HalfEdgeId(k.1)));
+                table.starts.push(table.sides.len() as u32);
+            }
+            table.edge_of.push(number[group as usize]);
+        }
+        table
+    }
+
+    /// The number of edges.
+    pub fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    /// Whether there is no edge.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The edge that `h` runs along.
+    pub fn edge(&self, h: HalfEdgeId) -> EdgeId {
+        self.edge_of[h.index()]
+    }
+
+    /// All half-edges along `edge`, ascending: one at the boundary, two inside, more where sheets meet.
+    pub fn sides(&self, edge: EdgeId) -> &[HalfEdgeId] {
+        &self.sides[self.starts[edge.index()] as usize..self.starts[edge.index() + 1] as usize]
+    }
+
+    /// The half-edge on the other side, where exactly two triangles meet.
+    pub fn twin(&self, h: HalfEdgeId) -> Option<HalfEdgeId> {
+        match *self.sides(self.edge(h)) {
+            [a, b] => Some(if a == h { b } else { a }),
+            _ => None,
+        }
+    }
+
+    /// Whether `h` bounds the only triangle at its edge.
+    pub fn is_boundary(&self, h: HalfEdgeId) -> bool {
+        self.sides(self.edge(h)).len() == 1
+    }
+
+    /// All edges with their sides.
+    pub fn iter(&self) -> impl Iterator<Item = (EdgeId, &[HalfEdgeId])> {
+        (0..self.len()).map(|e| (EdgeId::at(e), self.sides(EdgeId::at(e))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ids(t: [u32; 3]) -> [VertexId; 3] {
+        t.map(VertexId)
+    }
+
+    #[test]
+    fn an_edge_knows_its_sides() {
+        let table = EdgeTable::new(&[ids([0, 1, 2]), ids([0, 2, 3]), ids([2, 0, 4])]);
+        assert_eq!(table.len(), 7);
+        let shared = table.edge(HalfEdgeId(2));
+        assert_eq!(table.sides(shared), [HalfEdgeId(2), HalfEdgeId(3), HalfEdgeId(6)]);
+        assert_eq!(table.twin(HalfEdgeId(2)), None);
+        assert!(table.is_boundary(HalfEdgeId(0)));
+    }
+
+    #[test]
+    fn twins_are_mutual_and_edges_are_numbered_by_first_half_edge() {
+        let table = EdgeTable::new(&[ids([7, 1, 2]), ids([2, 1, 3]), ids([7, 2, 9])]);
+        for h in (0..9).map(HalfEdgeId) {
+            if let Some(twin) = table.twin(h) {
+                assert_eq!(table.twin(twin), Some(h));
+                assert_ne!(twin.face(), h.face());
+            }
+        }
+        let firsts: Vec<_> = table.iter().map(|(_, sides)| sides[0]).collect();
+        assert!(firsts.is_sorted());
+    }
+}

@@ -1,0 +1,14 @@
+//! Surfaces: from a soup of triangles to a mesh with edges, orientation and intrinsic lengths.
+
+mod census;
+mod edges;
+mod intrinsic;
+mod soup;
+mod surface;
+
+pub(crate) use census::orientation;
+pub use census::{Census, Umbrellas};
+pub use edges::EdgeTable;
+pub use intrinsic::{Metric, TriangleShape};
+pub use soup::{SoupError, TriangleSoup};
+pub use surface::SurfaceMesh;

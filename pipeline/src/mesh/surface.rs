@@ -1,0 +1,72 @@
+//! A repaired surface.
+
+use super::{Census, EdgeTable, Metric};
+use crate::id::VertexId;
+use crate::space::{BoundingBox, Vec3, triangle_area};
+
+/// A triangulated surface after repair: no triangle repeats a vertex or another triangle, orientable components
+/// are oriented, and sheets that only touched in a vertex have vertices of their own. Made by [`crate::repair`].
+#[derive(Clone, Debug)]
+pub struct SurfaceMesh {
+    pub(crate) points: Vec<Vec3>,
+    pub(crate) triangles: Vec<[VertexId; 3]>,
+    pub(crate) source: Vec<u32>,
+    pub(crate) welded: Vec<u32>,
+    pub(crate) edges: EdgeTable,
+    pub(crate) census: Census,
+    pub(crate) metric: Metric,
+}
+
+impl SurfaceMesh {
+    /// The positions of the vertices, in the unit of the input.
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// The triangles.
+    pub fn triangles(&self) -> &[[VertexId; 3]] {
+        &self.triangles
+    }
+
+    /// The position in the input file of triangle `face`.
+    pub fn source_triangle(&self, face: usize) -> u32 {
+        self.source[face]
+    }
+
+    /// The welded vertex that `vertex` is a copy of: vertices of the input, bit-equal ones merged, in the
+    /// order of their first appearance.
+    pub fn welded_vertex(&self, vertex: VertexId) -> u32 {
+        self.welded[vertex.index()]
+    }
+
+    /// The edges.
+    pub fn edges(&self) -> &EdgeTable {
+        &self.edges
+    }
+
+    /// The counts.
+    pub fn census(&self) -> &Census {
+        &self.census
+    }
+
+    /// The intrinsic metric.
+    pub fn metric(&self) -> &Metric {
+        &self.metric
+    }
+
+    /// The corners of a triangle in space.
+    pub fn corners(&self, face: usize) -> [Vec3; 3] {
+        self.triangles[face].map(|v| self.points[v.index()])
+    }
+
+    /// The total true area, in the unit of the input, squared.
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len()).map(|f| triangle_area(self.corners(f))).sum()
+    }
+
+    /// The smallest box around the surface.
+    pub fn bounding_box(&self) -> BoundingBox {
+        let origin = BoundingBox { min: [0.0; 3], max: [0.0; 3] };
+        BoundingBox::of(self.points.iter().copied()).unwrap_or(origin)
+    }
+}

@@ -1,0 +1,248 @@
+//! Repair: soup -> surface mesh.
+//!
+//! 1. Vertices with bit-equal coordinates are merged (the sign of zero does not count).
+//! 2. Triangles with two equal vertices, and copies of a triangle, are dropped. Slivers stay.
+//! 3. Cracks are closed: open edges that run side by side within a tolerance (see [`Settings::weld`]).
+//! 4. Every orientable component is oriented like the majority of its triangles.
+//! 5. Sheets that only touch in a vertex get vertices of their own.
+//! 6. Edge lengths are mollified where triangles are degenerate ([`crate::mesh::Metric`]).
+//!
+//! Everything that was found and done is counted, with the first few ids. Non-manifold edges are left as they
+//! are, and counted. What cannot be a surface at all (no triangle is left) is refused.
+
+mod cracks;
+mod weld;
+
+use crate::id::{FaceId, HalfEdgeId, VertexId};
+use crate::mesh::{Census, EdgeTable, Metric, SurfaceMesh, TriangleSoup, Umbrellas};
+use crate::space::{BoundingBox, Vec3, unit_scale};
+
+/// What repair may do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Open edges closer than this, relative to the diagonal of the bounding box, are joined. In `[0, 0.01]`;
+    /// 0 joins none. Default 1e-6.
+    pub weld: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { weld: 1e-6 }
+    }
+}
+
+/// A number of things found, and the first few of them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// How many.
+    pub count: usize,
+    /// The first ids, at most eight: positions in the input file.
+    pub first: Vec<u32>,
+}
+
+impl Found {
+    const SHOWN: usize = 8;
+
+    fn push(&mut self, id: u32) {
+        self.count += 1;
+        if self.first.len() < Self::SHOWN {
+            self.first.push(id);
+        }
+    }
+
+    fn of(ids: impl IntoIterator<Item = u32>) -> Self {
+        let mut found = Self::default();
+        ids.into_iter().for_each(|id| found.push(id));
+        found
+    }
+}
+
+/// What repair found and did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Points merged into a bit-equal one.
+    pub welded: usize,
+    /// Points that no triangle uses.
+    pub unreferenced_points: usize,
+    /// Pairs of open edges joined.
+    pub cracks_closed: usize,
+    /// Copies of a triangle, removed.
+    pub duplicate_triangles: Found,
+    /// Triangles with two equal vertices, removed.
+    pub degenerate_triangles: Found,
+    /// Triangles turned over.
+    pub flipped_triangles: Found,
+    /// Vertices (after welding) that were given to several sheets.
+    pub split_vertices: Found,
+    /// What was added to every intrinsic edge length, in the unit of the input.
+    pub mollified_by: f64,
+    /// Triangles whose area mollification changed by more than 1 %.
+    pub mollified_triangles: Found,
+}
+
+/// A repaired surface with the account of its repair.
+#[derive(Clone, Debug)]
+pub struct Repaired {
+    /// The surface.
+    pub mesh: SurfaceMesh,
+    /// The counts before repair: bit-equal vertices merged, triangles with two equal vertices left out.
+    pub raw: Census,
+    /// What was done.
+    pub report: Report,
+}
+
+/// Why a soup is no surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// Every triangle has two equal vertices.
+    #[error(
+        "all {triangles} triangles are degenerate (two corners coincide); check the unit and precision of the export"
+    )]
+    OnlyDegenerate {
+        /// How many triangles there were.
+        triangles: usize,
+    },
+}
+
+/// Triangles on their way through repair: each with its position in the input.
+struct Draft {
+    points: Vec<Vec3>,
+    triangles: Vec<[VertexId; 3]>,
+    source: Vec<u32>,
+}
+
+/// Repairs `soup`. The result depends on the order of the input only through its numbering.
+///
+/// # Errors
+/// [`Error::OnlyDegenerate`] when nothing is left.
+pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Error> {
+    let (mut draft, welded) = weld::weld(soup);
+    let mut report = Report { welded, ..Report::default() };
+    report.degenerate_triangles = draft.drop_degenerate();
+    if draft.triangles.is_empty() {
+        return Err(Error::OnlyDegenerate { triangles: soup.triangles().len() });
+    }
+    let raw = Census::new(&draft.triangles, &EdgeTable::new(&draft.triangles));
+    report.unreferenced_points = draft.points.len() - raw.vertices;
+    report.duplicate_triangles = draft.drop_duplicates();
+    draft.close_cracks(settings.weld, &mut report);
+    let edges = EdgeTable::new(&draft.triangles);
+    report.flipped_triangles = draft.orient(&edges);
+    Ok(Repaired { mesh: draft.into_mesh(&mut report), raw, report })
+}
+
+impl Draft {
+    /// Removes triangles with two equal vertices.
+    fn drop_degenerate(&mut self) -> Found {
+        let whole = |t: &[VertexId; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+        let keep: Vec<bool> = self.triangles.iter().map(whole).collect();
+        self.keep_only(&keep)
+    }
+
+    /// Removes all but the first of the triangles with the same three vertices.
+    fn drop_duplicates(&mut self) -> Found {
+        let mut keyed: Vec<([VertexId; 3], usize)> = self.triangles.iter().copied().zip(0..).collect();
+        keyed.iter_mut().for_each(|(t, _)| t.sort_unstable());
+        keyed.sort_unstable();
+        let mut keep = vec![true; keyed.len()];
+        for copies in keyed.chunk_by(|a, b| a.0 == b.0) {
+            copies[1..].iter().for_each(|c| keep[c.1] = false);
+        }
+        self.keep_only(&keep)
+    }
+
+    fn keep_only(&mut self, keep: &[bool]) -> Found {
+        let dropped = Found::of(self.source.iter().zip(keep).filter(|(_, keep)| !**keep).map(|(s, _)| *s));
+        let mut flags = keep.iter();
+        self.triangles.retain(|_| flags.next() == Some(&true));
+        let mut flags = keep.iter();
+        self.source.retain(|_| flags.next() == Some(&true));
+        dropped
+    }
+
+    /// Joins open edges within `weld` of each other, then drops what became degenerate or a copy.
+    fn close_cracks(&mut self, weld: f64, report: &mut Report) {
+        let edges = EdgeTable::new(&self.triangles);
+        let Some(diagonal) = BoundingBox::of(self.used_points()).map(|b| b.diagonal()) else { return };
+        let closed = cracks::find(&self.points, &self.triangles, &edges, weld * diagonal);
+        report.cracks_closed = closed.pairs;
+        if closed.pairs == 0 {
+            return;
+        }
+        self.triangles.iter_mut().for_each(|t| *t = t.map(|v| closed.target[v.index()]));
+        let copies = self.drop_duplicates();
+        report.duplicate_triangles.count += copies.count;
+        report.duplicate_triangles.first.extend(copies.first);
+        report.duplicate_triangles.first.truncate(Found::SHOWN);
+    }
+
+    fn used_points(&self) -> impl Iterator<Item = Vec3> {
+        self.triangles.iter().flatten().map(|v| self.points[v.index()])
+    }
+
+    /// Orients each orientable component like the majority of its triangles (the first one, in a tie).
+    fn orient(&mut self, edges: &EdgeTable) -> Found {
+        let found = crate::mesh::orientation(&self.triangles, edges);
+        let components = found.component.iter().max().map_or(0, |c| *c as usize + 1);
+        let mut balance = vec![0_i64; components];
+        for (c, flip) in found.component.iter().zip(&found.flip) {
+            balance[*c as usize] += if *flip { -1 } else { 1 };
+        }
+        let first_of_all = found.flip.iter().zip(&found.component);
+        let turned = first_of_all.map(|(flip, c)| *flip != (balance[*c as usize] < 0));
+        let mut flipped = Found::default();
+        for (face, turn) in turned.enumerate() {
+            if turn {
+                self.triangles[face].swap(1, 2);
+                flipped.push(self.source[face]);
+            }
+        }
+        flipped
+    }
+
+    /// Gives every umbrella a vertex of its own, drops unused points, and measures.
+    fn into_mesh(self, report: &mut Report) -> SurfaceMesh {
+        let edges = EdgeTable::new(&self.triangles);
+        let umbrellas = Umbrellas::new(&self.triangles, &edges);
+        let (of_umbrella, welded) = split_vertices(&umbrellas.vertices(&self.triangles), report);
+        let renamed = |face: usize| [0, 1, 2].map(|k| of_umbrella[umbrellas.of_corner[3 * face + k] as usize]);
+        let triangles: Vec<_> = (0..self.triangles.len()).map(renamed).collect();
+        let points: Vec<Vec3> = welded.iter().map(|w| self.points[*w as usize]).collect();
+        let corners: Vec<_> = triangles.iter().map(|t| t.map(|v: VertexId| points[v.index()])).collect();
+        let diagonal = BoundingBox::of(points.iter().copied()).map_or(0.0, |b| b.diagonal());
+        let metric = Metric::new(&corners, unit_scale(diagonal));
+        report.mollified_by = metric.mollified_by / metric.scale;
+        report.mollified_triangles =
+            Found::of((0..corners.len()).filter(|f| metric.flagged[*f]).map(|f| self.source[f]));
+        // Splitting vertices moves no edge: the table of edges stays as it is, but for non-manifold ones, whose
+        // sides may now end in different copies.
+        let edges = EdgeTable::new(&triangles);
+        let census = Census::new(&triangles, &edges);
+        SurfaceMesh { points, triangles, source: self.source, welded, edges, census, metric }
+    }
+}
+
+/// One vertex per umbrella, in ascending order of the vertices they come from: per umbrella its vertex, and per
+/// vertex the welded point it is a copy of.
+fn split_vertices(umbrella_vertices: &[VertexId], report: &mut Report) -> (Vec<VertexId>, Vec<u32>) {
+    let mut order: Vec<(VertexId, usize)> = umbrella_vertices.iter().copied().zip(0..).collect();
+    order.sort_unstable();
+    let mut of_umbrella = vec![VertexId(0); order.len()];
+    let welded = order.iter().map(|(v, _)| v.0).collect();
+    for (new, (_, umbrella)) in order.iter().enumerate() {
+        of_umbrella[*umbrella] = VertexId::at(new);
+    }
+    for copies in order.chunk_by(|a, b| a.0 == b.0).filter(|c| c.len() > 1) {
+        report.split_vertices.push(copies[0].0.0);
+    }
+    (of_umbrella, welded)
+}
+
+/// The half-edges along open edges, ascending.
+fn open_half_edges(edges: &EdgeTable, faces: usize) -> Vec<HalfEdgeId> {
+    let all = (0..faces).flat_map(|f| (0..3).map(move |k| HalfEdgeId::side_of(FaceId::at(f), k)));
+    all.filter(|h| edges.is_boundary(*h)).collect()
+}
+
+#[cfg(test)]
+mod tests;

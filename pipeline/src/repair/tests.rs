@@ -1,0 +1,103 @@
+use super::*;
+use crate::shapes;
+
+fn repaired(soup: &TriangleSoup) -> Repaired {
+    repair(soup, &Settings::default()).expect("a surface is left")
+}
+
+/// Two triangles of a unit square, the second one moved by `gap`, as a soup with six points.
+fn cracked_square(gap: Vec3) -> TriangleSoup {
+    let moved = |p: Vec3| [p[0] + gap[0], p[1] + gap[1], p[2] + gap[2]];
+    let points =
+        vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], moved([0.0; 3]), moved([1.0, 1.0, 0.0]), [0.0, 1.0, 0.0]];
+    TriangleSoup::new(points, vec![[0, 1, 2], [3, 4, 5]]).expect("sound")
+}
+
+#[test]
+fn bit_equal_vertices_are_merged_whatever_the_sign_of_zero() {
+    let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [-0.0, 0.0, -0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let soup = TriangleSoup::new(points, vec![[0, 1, 2], [3, 4, 5]]).expect("sound");
+    let got = repaired(&soup);
+    assert_eq!((got.report.welded, got.raw.vertices, got.raw.boundary_loops), (2, 4, 1));
+    assert!(got.mesh.census().is_one_chart());
+}
+
+#[test]
+fn cracks_within_the_tolerance_are_closed_and_wider_ones_are_not() {
+    let narrow = repaired(&cracked_square([3e-7, 0.0, 4e-7]));
+    assert_eq!((narrow.raw.components, narrow.report.cracks_closed), (2, 1));
+    assert!(narrow.mesh.census().is_one_chart());
+    let wide = repaired(&cracked_square([3e-5, 0.0, 4e-5]));
+    assert_eq!((wide.report.cracks_closed, wide.mesh.census().components), (0, 2));
+    let off = repair(&cracked_square([3e-7, 0.0, 4e-7]), &Settings { weld: 0.0 }).expect("a surface is left");
+    assert_eq!(off.report.cracks_closed, 0);
+}
+
+#[test]
+fn the_walls_of_a_thin_gap_stay_apart() {
+    let gap = 1e-7;
+    let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, gap], [1.0, 0.0, gap], [0.0, 1.0, gap]];
+    let soup = TriangleSoup::new(points, vec![[0, 1, 2], [3, 5, 4]]).expect("sound");
+    let got = repaired(&soup);
+    assert_eq!((got.report.cracks_closed, got.mesh.census().components), (0, 2));
+}
+
+#[test]
+fn no_triangle_loses_a_side_to_welding() {
+    // The second triangle is a needle thinner than the tolerance: all three of its vertices are near the edge.
+    let points =
+        vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, -1e-8, 0.0], [1.0, -1e-8, 0.0], [1.0, -3e-8, 0.0]];
+    let soup = TriangleSoup::new(points, vec![[0, 1, 2], [4, 3, 5]]).expect("sound");
+    let got = repaired(&soup);
+    assert_eq!(got.mesh.triangles().len(), 2);
+    assert!(got.mesh.triangles().iter().all(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]));
+}
+
+#[test]
+fn copies_and_degenerate_triangles_go_and_are_named() {
+    let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+    let soup = TriangleSoup::new(points, vec![[0, 1, 2], [1, 1, 2], [2, 1, 0], [1, 3, 2]]).expect("sound");
+    let got = repaired(&soup);
+    assert_eq!(got.report.degenerate_triangles, Found { count: 1, first: vec![1] });
+    assert_eq!(got.report.duplicate_triangles, Found { count: 1, first: vec![2] });
+    assert_eq!([0, 1].map(|f| got.mesh.source_triangle(f)), [0, 3]);
+}
+
+#[test]
+fn the_majority_decides_the_orientation() {
+    let mut soup = shapes::disk(5);
+    let mut triangles = soup.triangles().to_vec();
+    for t in triangles.iter_mut().skip(3).step_by(7) {
+        t.swap(0, 1);
+    }
+    let turned = (3..triangles.len()).step_by(7).count();
+    soup = TriangleSoup::new(soup.points().to_vec(), triangles).expect("sound");
+    let got = repaired(&soup);
+    assert_eq!((got.report.flipped_triangles.count, got.report.flipped_triangles.first[0]), (turned, 3));
+    assert_eq!(got.mesh.census().inconsistent_edges, 0);
+    assert!(got.raw.inconsistent_edges > 0);
+}
+
+#[test]
+fn sheets_that_touch_get_their_own_vertices() {
+    let got = repaired(&shapes::bow_tie());
+    assert_eq!(got.report.split_vertices.count, 1);
+    let census = got.mesh.census();
+    assert_eq!((census.components, census.nonmanifold_vertices), (2, 0));
+}
+
+#[test]
+fn nothing_left_is_refused() {
+    let soup = TriangleSoup::new(vec![[0.0; 3]; 3], vec![[0, 1, 2]]).expect("sound");
+    assert_eq!(repair(&soup, &Settings::default()).map(|_| ()), Err(Error::OnlyDegenerate { triangles: 1 }));
+}
+
+#[test]
+fn repair_does_not_depend_on_units() {
+    for scale in [1e-8, 1.0, 1e8] {
+        let soup = shapes::cracked_patch();
+        let points = soup.points().iter().map(|p| p.map(|c| c * scale)).collect();
+        let got = repaired(&TriangleSoup::new(points, soup.triangles().to_vec()).expect("sound"));
+        assert!(got.report.cracks_closed > 0 && got.mesh.census().is_one_chart(), "scale {scale}");
+    }
+}

@@ -1,0 +1,263 @@
+//! Procedural surfaces, named by their topology or their defect: for tests, examples and the fixtures.
+//!
+//! None of them depends on anything but its arguments.
+
+use crate::mesh::TriangleSoup;
+use crate::space::Vec3;
+use std::f64::consts::TAU;
+
+/// The soup of `points` and `triangles`, which the makers below know to be sound.
+fn soup(points: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> TriangleSoup {
+    TriangleSoup::new(points, triangles).expect("procedural shapes are sound")
+}
+
+/// Points of the unit disk on `rings` rings of 6, 12, 18, ... points around a centre, and the triangles between
+/// them, all turning left.
+fn ring_disk(rings: u32) -> (Vec<[f64; 2]>, Vec<[u32; 3]>) {
+    let mut points = vec![[0.0; 2]];
+    for i in 1..=rings {
+        for j in 0..6 * i {
+            let (r, angle) = (f64::from(i) / f64::from(rings), TAU * f64::from(j) / f64::from(6 * i));
+            points.push([r * angle.cos(), r * angle.sin()]);
+        }
+    }
+    let first = |i: u32| if i == 0 { 0 } else { 1 + 3 * i * (i - 1) };
+    let at = |i: u32, j: u32| first(i) + if i == 0 { 0 } else { j % (6 * i) };
+    let mut triangles = Vec::new();
+    for i in 1..=rings {
+        for (sector, k) in (0..6).flat_map(|s| (0..i).map(move |k| (s, k))) {
+            let (outer, inner) = (sector * i + k, sector * (i - 1) + k);
+            triangles.push([at(i - 1, inner), at(i, outer), at(i, outer + 1)]);
+            if k + 1 < i {
+                triangles.push([at(i - 1, inner), at(i, outer + 1), at(i - 1, inner + 1)]);
+            }
+        }
+    }
+    (points, triangles)
+}
+
+/// A gently curved disk: `rings` rings of triangles, 6 `rings`^2 in all.
+pub fn disk(rings: u32) -> TriangleSoup {
+    let (points, triangles) = ring_disk(rings);
+    let lifted = points.iter().map(|[x, y]| [*x, *y, 0.3 * (2.0 * x).sin() * (1.5 * y).cos()]);
+    soup(lifted.collect(), triangles)
+}
+
+/// A flat disk: `rings` rings of triangles in the plane z = 0.
+pub fn flat_disk(rings: u32) -> TriangleSoup {
+    let (points, triangles) = ring_disk(rings);
+    soup(points.iter().map(|[x, y]| [*x, *y, 0.0]).collect(), triangles)
+}
+
+/// A disk that is strongly bent out of the plane over irregular points: z = 2.5 sin(3x+1) cos(4y) + 0.75 sin 9x
+/// sin 7y. Its harmonic P2 map has many invalid triangles. `jitter` (0 to 0.5) moves points inside by that share
+/// of the ring distance.
+pub fn bent_disk(rings: u32, jitter: f64) -> TriangleSoup {
+    let (mut points, triangles) = ring_disk(rings);
+    let mut random = Random(12345);
+    let inside = points.len() - 6 * rings as usize;
+    for p in points.iter_mut().take(inside) {
+        *p = p.map(|c| c + jitter / f64::from(rings) * random.symmetric());
+    }
+    let height =
+        |x: f64, y: f64| 2.5 * (3.0 * x + 1.0).sin() * (4.0 * y).cos() + 0.75 * (9.0 * x).sin() * (7.0 * y).sin();
+    soup(points.iter().map(|[x, y]| [*x, *y, height(*x, *y)]).collect(), triangles)
+}
+
+/// A square plate of `n` x `n` squares with a row of `holes` square holes, gently curved. `n` is at least
+/// 4 `holes` + 1, so that every hole keeps a rim.
+pub fn disk_with_holes(n: u32, holes: u32) -> TriangleSoup {
+    let in_hole = |i: u32, j: u32| {
+        let (row, step) = (n / 2, n / holes.max(1));
+        (0..holes).any(|k| (i.abs_diff(step * k + step / 2)) == 0 && j == row)
+    };
+    let at = |i: u32, j: u32| i * (n + 1) + j;
+    let mut triangles = Vec::new();
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+        if !in_hole(i, j) {
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    let coordinate = |k: u32| 2.0 * f64::from(k) / f64::from(n) - 1.0;
+    let point = |k: u32| (coordinate(k / (n + 1)), coordinate(k % (n + 1)));
+    let points = (0..(n + 1) * (n + 1)).map(point).map(|(x, y)| [x, y, 0.4 * (3.0 * x).sin() * y.cos()]);
+    soup(points.collect(), triangles)
+}
+
+/// Five points in the plane of which Floater's theory is tested: the harmonic map onto the corners of a square
+/// folds (Floater 1998, *Parametric tilings and scattered data approximation*, section 5 gives such an example).
+/// The corners 0 to 3 belong at (1,0), (0,1), (-1,0), (0,-1).
+pub fn floater_five() -> TriangleSoup {
+    let points = vec![[0.0, 0.0, 0.0], [11.0, 0.0, 0.0], [10.0, 2.0, 0.0], [2.0, 11.0, 0.0], [5.0, 7.0, 0.0]];
+    soup(points, vec![[4, 3, 0], [4, 2, 3], [4, 1, 2], [4, 0, 1]])
+}
+
+/// Three triangles around a vertex in space: the smallest surface whose harmonic map folds.
+pub fn folding_three() -> TriangleSoup {
+    let points = vec![[0.0, 0.0, 0.0], [1.0, 5.0, 8.0], [-1.0, 1.0, 2.0], [1.0, -5.0, 5.0]];
+    soup(points, vec![[0, 1, 2], [0, 2, 3], [0, 3, 1]])
+}
+
+/// Six triangles around a vertex in the plane: the triangle that P1 folds is not the one that P2 folds.
+pub fn folding_six() -> TriangleSoup {
+    let ring = [[8.0, 1.0], [6.0, 5.0], [2.0, 9.0], [1.0, 5.0], [-7.0, -3.0], [-1.0, -5.0]];
+    let points = std::iter::once([0.0; 3]).chain(ring.map(|[x, y]| [x, y, 0.0])).collect();
+    soup(points, (0..6).map(|k| [0, 1 + k, 1 + (k + 1) % 6]).collect())
+}
+
+/// Two triangles that share a vertex and nothing else.
+pub fn bow_tie() -> TriangleSoup {
+    let points = vec![[0.0; 3], [1.0, 0.5, 0.0], [1.0, -0.5, 0.0], [-1.0, 0.5, 0.0], [-1.0, -0.5, 0.0]];
+    soup(points, vec![[0, 2, 1], [0, 3, 4]])
+}
+
+/// A Moebius strip of `n` (at least 3) squares.
+pub fn moebius(n: u32) -> TriangleSoup {
+    let point = |i: u32, side: f64| {
+        let angle = TAU * f64::from(i) / f64::from(n);
+        let (r, z) = (1.0 + 0.3 * side * (0.5 * angle).cos(), 0.3 * side * (0.5 * angle).sin());
+        [r * angle.cos(), r * angle.sin(), z]
+    };
+    let points = (0..n).flat_map(|i| [point(i, -1.0), point(i, 1.0)]).collect();
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        let (a, b) = (2 * i, 2 * i + 1);
+        // After one turn the two sides of the strip have changed places.
+        let (c, d) = if i + 1 == n { (1, 0) } else { (2 * i + 2, 2 * i + 3) };
+        triangles.extend([[a, c, d], [a, d, b]]);
+    }
+    soup(points, triangles)
+}
+
+/// A strip of `n` squares whose triangles get thinner and thinner, the last ones exactly flat.
+pub fn sliver_strip(n: u32) -> TriangleSoup {
+    let height = |i: u32| if i + 2 >= n { 0.0 } else { 0.25_f64.powi(i as i32) };
+    let mut points = Vec::new();
+    for i in 0..=n {
+        let x = f64::from(i);
+        points.extend([[x, 0.0, 0.0], [x + 0.5, height(i), 0.0]]);
+    }
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        let a = 2 * i;
+        triangles.extend([[a, a + 2, a + 1], [a + 1, a + 2, a + 3]]);
+    }
+    soup(points, triangles)
+}
+
+/// A curved plate cut along its middle: the two sides of the cut differ by a few units in the last place of
+/// single precision, as exporters leave them.
+pub fn cracked_patch() -> TriangleSoup {
+    let n = 8;
+    let height = |x: f64, y: f64| 0.2 * (2.0 * x + y).sin();
+    let mut points = Vec::new();
+    let mut triangles = Vec::new();
+    for half in 0..2 {
+        let base = points.len() as u32;
+        for (i, j) in (0..=n / 2).flat_map(|i| (0..=n).map(move |j| (i, j))) {
+            let (x, y) = (f64::from(half * n / 2 + i) / f64::from(n), f64::from(j) / f64::from(n));
+            let on_cut = half == 1 && i == 0;
+            let gap = if on_cut { 2e-7 * (1.0 + f64::from(j % 3)) } else { 0.0 };
+            points.push([x + gap, y, height(x, y) - gap]);
+        }
+        let at = |i: u32, j: u32| base + i * (n + 1) + j;
+        for (i, j) in (0..n / 2).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    soup(points, triangles)
+}
+
+/// A sphere of `n` (at least 2) bands between the poles.
+pub fn sphere(n: u32) -> TriangleSoup {
+    let m = 2 * n;
+    let mut points = vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
+    for (i, j) in (1..n).flat_map(|i| (0..m).map(move |j| (i, j))) {
+        let (polar, angle) = (0.5 * TAU * f64::from(i) / f64::from(n), TAU * f64::from(j) / f64::from(m));
+        points.push([polar.sin() * angle.cos(), polar.sin() * angle.sin(), polar.cos()]);
+    }
+    let at = |i: u32, j: u32| 2 + (i - 1) * m + j % m;
+    let mut triangles = Vec::new();
+    for j in 0..m {
+        triangles.extend([[0, at(1, j), at(1, j + 1)], [1, at(n - 1, j + 1), at(n - 1, j)]]);
+        for i in 1..n - 1 {
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    soup(points, triangles)
+}
+
+/// A finger: a disk whose middle is drawn out to a closed tube of height `length` (in diameters of the tube).
+/// Its map needs an area ratio of about e^(4 `length`).
+pub fn finger(around: u32, length: u32) -> TriangleSoup {
+    let mut points = vec![];
+    let rings = around / 3 * length + 2;
+    let ring = |k: u32| {
+        let height = f64::from(k) / f64::from(around / 3);
+        let radius = if k == 0 { 1.5 } else { 0.5 };
+        (radius, 1.0 * (height - f64::from(u32::from(k > 0)) / f64::from(around / 3)))
+    };
+    for (k, j) in (0..rings).flat_map(|k| (0..around).map(move |j| (k, j))) {
+        let (radius, z) = ring(k);
+        let angle = TAU * (f64::from(j) + 0.5 * f64::from(k % 2)) / f64::from(around);
+        points.push([radius * angle.cos(), radius * angle.sin(), z]);
+    }
+    let tip = points.len() as u32;
+    points.push([0.0, 0.0, ring(rings - 1).1 + 0.2]);
+    let at = |k: u32, j: u32| k * around + j % around;
+    let mut triangles = Vec::new();
+    for (k, j) in (0..rings - 1).flat_map(|k| (0..around).map(move |j| (k, j))) {
+        if k % 2 == 0 {
+            triangles.extend([[at(k, j), at(k, j + 1), at(k + 1, j)], [at(k, j + 1), at(k + 1, j + 1), at(k + 1, j)]]);
+        } else {
+            triangles.extend([[at(k, j), at(k, j + 1), at(k + 1, j + 1)], [at(k, j), at(k + 1, j + 1), at(k + 1, j)]]);
+        }
+    }
+    triangles.extend((0..around).map(|j| [at(rings - 1, j), at(rings - 1, j + 1), tip]));
+    soup(points, triangles)
+}
+
+/// The pseudo-random numbers of SplitMix64 (Steele, Lea and Flood 2014, doi 10.1145/2660193.2660195).
+struct Random(u64);
+
+impl Random {
+    /// A number between -1 and 1.
+    fn symmetric(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::repair::{Settings, repair};
+
+    #[test]
+    fn shapes_have_the_topology_of_their_names() {
+        let check = |soup: TriangleSoup, components, loops, genus, orientable| {
+            let got = repair(&soup, &Settings::default()).expect("a surface is left");
+            let c = got.mesh.census();
+            assert_eq!((c.components, c.boundary_loops, c.genus, c.orientable), (components, loops, genus, orientable));
+        };
+        check(disk(4), 1, 1, Some(0), true);
+        check(flat_disk(3), 1, 1, Some(0), true);
+        check(bent_disk(10, 0.3), 1, 1, Some(0), true);
+        check(disk_with_holes(17, 3), 1, 4, Some(0), true);
+        check(floater_five(), 1, 1, Some(0), true);
+        check(folding_three(), 1, 1, Some(0), true);
+        check(folding_six(), 1, 1, Some(0), true);
+        check(bow_tie(), 2, 2, Some(0), true);
+        check(moebius(9), 1, 1, None, false);
+        check(sliver_strip(12), 1, 1, Some(0), true);
+        check(cracked_patch(), 1, 1, Some(0), true);
+        check(sphere(6), 1, 0, Some(0), true);
+        check(finger(12, 2), 1, 1, Some(0), true);
+    }
+}

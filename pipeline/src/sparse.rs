@@ -1,0 +1,249 @@
+//! Sparse linear systems. The only file that names `faer`.
+//!
+//! Symmetric positive definite systems are assembled from small dense element matrices into the lower triangle
+//! (compressed columns) and solved by a supernodal Cholesky factorisation (minimum degree order; one thread, as
+//! faer's threaded solve costs several times the work). General systems are solved by LU.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::prelude::Solve;
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
+use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
+use faer::{Conj, MatMut, Par, Side};
+
+/// Stands for a degree of freedom that is prescribed: its row and column are not part of the system.
+pub const PRESCRIBED: u32 = u32::MAX;
+
+/// Why a system was not solved.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// The matrix is not positive definite, or not invertible, in double precision.
+    #[error("the system of {unknowns} unknowns is singular in double precision")]
+    Singular {
+        /// The order of the matrix.
+        unknowns: usize,
+    },
+    /// The factor is too large for memory or for 32-bit indices.
+    #[error("the system of {unknowns} unknowns is too large to be factorised")]
+    TooLarge {
+        /// The order of the matrix.
+        unknowns: usize,
+    },
+}
+
+/// The pattern of a symmetric matrix that is the sum of dense element matrices, and where each entry of each
+/// element goes.
+pub struct Pattern {
+    unknowns: usize,
+    starts: Vec<u32>,
+    rows: Vec<u32>,
+    slots: Vec<u32>,
+}
+
+impl Pattern {
+    /// The pattern for elements that join the given unknowns ([`PRESCRIBED`] ones are left out).
+    pub fn new<const N: usize>(unknowns: usize, elements: &[[u32; N]]) -> Self {
+        let mut heads = vec![0_u32; unknowns + 1];
+        for (row, column) in elements.iter().flat_map(entries) {
+            if row != PRESCRIBED {
+                heads[column as usize + 1] += 1;
+            }
+        }
+        (0..unknowns).for_each(|j| heads[j + 1] += heads[j]);
+        let mut filled = vec![0_u32; heads[unknowns] as usize];
+        let mut next = heads.clone();
+        for (row, column) in elements.iter().flat_map(entries) {
+            if row != PRESCRIBED {
+                filled[next[column as usize] as usize] = row;
+                next[column as usize] += 1;
+            }
+        }
+        let mut pattern = Self { unknowns, starts: vec![0], rows: Vec::new(), slots: Vec::new() };
+        for j in 0..unknowns {
+            let column = &mut filled[heads[j] as usize..heads[j + 1] as usize];
+            column.sort_unstable();
+            pattern.rows.extend(column.chunk_by(|a, b| a == b).map(|run| run[0]));
+            pattern.starts.push(pattern.rows.len() as u32);
+        }
+        pattern.slots = elements.iter().flat_map(entries).map(|e| pattern.slot(e)).collect();
+        pattern
+    }
+
+    fn slot(&self, (row, column): (u32, u32)) -> u32 {
+        if row == PRESCRIBED {
+            return PRESCRIBED;
+        }
+        let (start, end) = (self.starts[column as usize] as usize, self.starts[column as usize + 1] as usize);
+        (start + self.rows[start..end].partition_point(|r| *r < row)) as u32
+    }
+
+    /// A matrix of zeros.
+    pub fn zeros(&self) -> Vec<f64> {
+        vec![0.0; self.rows.len()]
+    }
+
+    /// Adds the dense symmetric matrix of element `element` to `values`.
+    pub fn add<const N: usize>(&self, values: &mut [f64], element: usize, matrix: &[[f64; N]; N]) {
+        let per_element = N * (N + 1) / 2;
+        let slots = &self.slots[element * per_element..(element + 1) * per_element];
+        let lower = (0..N).flat_map(|i| (0..=i).map(move |j| (i, j)));
+        for (slot, (i, j)) in slots.iter().zip(lower) {
+            if *slot != PRESCRIBED {
+                values[*slot as usize] += matrix[i][j];
+            }
+        }
+    }
+
+    /// The places of the diagonal entries.
+    pub fn diagonal(&self) -> impl Iterator<Item = usize> {
+        self.starts[..self.unknowns].iter().map(|s| *s as usize)
+    }
+
+    /// Orders and analyses the matrix; the result serves every matrix of this pattern.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`].
+    pub fn analyse(&self) -> Result<Analysis<'_>, Error> {
+        let symbolic =
+            factorize_symbolic_cholesky(self.view(), Side::Lower, SymmetricOrdering::Amd, Default::default());
+        let symbolic = symbolic.map_err(|_| Error::TooLarge { unknowns: self.unknowns })?;
+        Ok(Analysis { pattern: self, symbolic })
+    }
+
+    fn view(&self) -> SymbolicSparseColMatRef<'_, u32> {
+        SymbolicSparseColMatRef::new_checked(self.unknowns, self.unknowns, &self.starts, None, &self.rows)
+    }
+}
+
+/// The entries (row, column), row >= column, of an element in the lower triangle; `PRESCRIBED` where there is none.
+fn entries<const N: usize>(unknowns: &[u32; N]) -> impl Iterator<Item = (u32, u32)> {
+    let lower = (0..N).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    lower.map(|(i, j)| {
+        let (a, b) = (unknowns[i], unknowns[j]);
+        if a == PRESCRIBED || b == PRESCRIBED { (PRESCRIBED, PRESCRIBED) } else { (a.max(b), a.min(b)) }
+    })
+}
+
+/// An ordered and analysed pattern.
+pub struct Analysis<'a> {
+    pattern: &'a Pattern,
+    symbolic: SymbolicCholesky<u32>,
+}
+
+impl Analysis<'_> {
+    /// The bytes that a factor takes.
+    pub fn factor_bytes(&self) -> usize {
+        self.symbolic.len_val() * size_of::<f64>()
+    }
+
+    /// Factorises the matrix with these `values`.
+    ///
+    /// # Errors
+    /// [`Error::Singular`] when a pivot is not positive, [`Error::TooLarge`] when memory is short.
+    pub fn factorise(&self, values: &[f64]) -> Result<Factor<'_>, Error> {
+        let unknowns = self.pattern.unknowns;
+        let too_large = Error::TooLarge { unknowns };
+        let mut factor = Vec::new();
+        factor.try_reserve_exact(self.symbolic.len_val()).map_err(|_| too_large.clone())?;
+        factor.resize(self.symbolic.len_val(), 0.0);
+        let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let mut memory = MemBuffer::try_new(scratch).map_err(|_| too_large)?;
+        let matrix = SparseColMatRef::new(self.pattern.view(), values);
+        let stack = MemStack::new(&mut memory);
+        let side = Side::Lower;
+        self.symbolic
+            .factorize_numeric_llt(&mut factor, matrix, side, Default::default(), Par::Seq, stack, Default::default())
+            .map_err(|_| Error::Singular { unknowns })?;
+        Ok(Factor { symbolic: &self.symbolic, values: factor })
+    }
+}
+
+/// A Cholesky factor.
+pub struct Factor<'a> {
+    symbolic: &'a SymbolicCholesky<u32>,
+    values: Vec<f64>,
+}
+
+impl Factor<'_> {
+    /// Solves for `columns` right-hand sides, one after another in `rhs`, in place.
+    pub fn solve(&self, rhs: &mut [f64], columns: usize) {
+        let scratch = self.symbolic.solve_in_place_scratch::<f64>(columns, Par::Seq);
+        let mut memory = MemBuffer::new(scratch);
+        let rows = self.symbolic.nrows();
+        let rhs = MatMut::from_column_major_slice_mut(rhs, rows, columns);
+        let factor = LltRef::<u32, f64>::new(self.symbolic, &self.values);
+        factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(&mut memory));
+    }
+}
+
+/// Solves a general square system, given by its entries (row, column, value; equal places add up), for `columns`
+/// right-hand sides in place.
+///
+/// # Errors
+/// [`Error::Singular`], [`Error::TooLarge`].
+pub fn solve_general(
+    unknowns: usize,
+    entries: &[(u32, u32, f64)],
+    rhs: &mut [f64],
+    columns: usize,
+) -> Result<(), Error> {
+    let too_large = |_| Error::TooLarge { unknowns };
+    let triplets: Vec<_> = entries.iter().map(|(r, c, v)| Triplet::new(*r, *c, *v)).collect();
+    let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(unknowns, unknowns, &triplets)
+        .map_err(|_| Error::TooLarge { unknowns })?;
+    let (symbolic, _): (SymbolicSparseColMat<u32>, Vec<f64>) = matrix.clone().into_parts();
+    let symbolic = faer::sparse::linalg::solvers::SymbolicLu::try_new(symbolic.rb()).map_err(too_large)?;
+    let factor = faer::sparse::linalg::solvers::Lu::try_new_with_symbolic(symbolic, matrix.rb());
+    let factor = factor.map_err(|_| Error::Singular { unknowns })?;
+    factor.solve_in_place(MatMut::from_column_major_slice_mut(rhs, unknowns, columns));
+    if rhs.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(Error::Singular { unknowns }) }
+}
+
+use faer::reborrow::Reborrow;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chain of springs between unknowns 0..n, the first one fastened.
+    fn chain(n: u32) -> (Vec<[u32; 2]>, [[f64; 2]; 2]) {
+        let elements = (0..n).map(|i| [if i == 0 { PRESCRIBED } else { i - 1 }, i]).collect();
+        (elements, [[1.0, -1.0], [-1.0, 1.0]])
+    }
+
+    #[test]
+    fn a_chain_of_springs_stretches_linearly() {
+        let (elements, matrix) = chain(50);
+        let pattern = Pattern::new(50, &elements);
+        let mut values = pattern.zeros();
+        (0..elements.len()).for_each(|e| pattern.add(&mut values, e, &matrix));
+        let analysis = pattern.analyse().expect("small");
+        let factor = analysis.factorise(&values).expect("positive definite");
+        let mut pull = vec![0.0; 100];
+        pull[49] = 1.0;
+        pull[99] = 2.0;
+        factor.solve(&mut pull, 2);
+        for i in 0..50 {
+            let stretched = (i + 1) as f64;
+            assert!((pull[i] - stretched).abs() < 1e-12 && (pull[50 + i] - 2.0 * stretched).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_loose_chain_is_singular() {
+        let pattern = Pattern::new(2, &[[0, 1]]);
+        let mut values = pattern.zeros();
+        pattern.add(&mut values, 0, &[[1.0, -1.0], [-1.0, 1.0]]);
+        let analysis = pattern.analyse().expect("small");
+        assert_eq!(analysis.factorise(&values).err(), Some(Error::Singular { unknowns: 2 }));
+    }
+
+    #[test]
+    fn a_general_system_is_solved() {
+        let entries = [(0, 0, 2.0), (0, 1, 1.0), (1, 0, -1.0), (1, 1, 3.0)];
+        let mut rhs = [5.0, 8.0];
+        solve_general(2, &entries, &mut rhs, 1).expect("regular");
+        assert!((rhs[0] - 1.0).abs() < 1e-14 && (rhs[1] - 3.0).abs() < 1e-14);
+        let singular = [(0, 0, 1.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 1.0)];
+        assert!(solve_general(2, &singular, &mut [1.0, 2.0], 1).is_err());
+    }
+}
