@@ -11,3 +11,7 @@ mod sparse;
 mod union_find;
 pub use decompose::decompose;
 pub use repair::repair;
+pub mod bernstein;
+pub mod boundary;
+pub mod linear;
+mod weights;

@@ -8,7 +8,7 @@ use crate::space::Vec3;
 /// Merges points with equal coordinates (0 and -0 are equal); returns the draft and how many points were merged
 /// away. Vertices are numbered in the order of their first appearance among the points.
 pub(super) fn weld(soup: &TriangleSoup) -> (Draft, usize) {
-    let mut order: Vec<(([u64; 3]), u32)> = soup.points().iter().map(|p| bits(*p)).zip(0..).collect();
+    let mut order: Vec<([u64; 3], u32)> = soup.points().iter().map(|p| bits(*p)).zip(0..).collect();
     order.sort_unstable();
     let mut first = vec![0_u32; order.len()];
     for equal in order.chunk_by(|a, b| a.0 == b.0) {

@@ -1,0 +1,150 @@
+//! Where the outer loop goes in the plane.
+//!
+//! The loop is laid on the unit circle by arc length (edges no shorter than 1e-4 of the mean, so that no two
+//! vertices coincide), or on points that the caller prescribes. Mid-edge nodes lie on the arc, or on the chord.
+//! The boundary is chosen once: the harmonic map, the feasible start and the result share it.
+
+use crate::closed::ClosedChart;
+use crate::grid::GridPoint;
+use std::f64::consts::TAU;
+
+/// The shortest edge, relative to the mean, as far as its arc is concerned.
+const SHORTEST: f64 = 1e-4;
+
+/// The longest arc, as a share of the circle: below one half, so that every arc is seen from the centre.
+const LONGEST: f64 = 0.45;
+
+/// Where mid-edge nodes of the outer loop lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mids {
+    /// In the middle of the arc of the unit circle.
+    Arc,
+    /// In the middle of the straight edge.
+    Chord,
+}
+
+/// The outer loop in the plane, in the order of [`ClosedChart::outer`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Boundary {
+    /// Per half-edge of the loop, the place of the vertex it begins at.
+    vertices: Vec<GridPoint>,
+    /// Per half-edge of the loop, the place of its mid-edge node.
+    mids: Vec<GridPoint>,
+}
+
+/// Why prescribed points are no boundary.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// Their number differs from that of the loop's vertices.
+    #[error("{given} boundary points were prescribed, but the outer loop has {needed} vertices")]
+    Count {
+        /// Points given.
+        given: usize,
+        /// Vertices of the loop.
+        needed: usize,
+    },
+}
+
+impl Boundary {
+    /// The loop on the unit circle, by arc length, counter-clockwise from (1, 0).
+    pub fn circle(chart: &ClosedChart, mids: Mids) -> Self {
+        let outer = chart.outer();
+        let lengths: Vec<f64> = outer.iter().map(|h| chart.shapes()[h.face().index()].lengths[h.side()]).collect();
+        let shares = arc_shares(&lengths);
+        let mut vertices = Vec::with_capacity(outer.len());
+        let mut middle = Vec::with_capacity(outer.len());
+        let mut travelled = 0.0;
+        for share in shares {
+            vertices.push(GridPoint::vertex(on_circle(travelled)));
+            middle.push(GridPoint::mid(on_circle(travelled + 0.5 * share)));
+            travelled += share;
+        }
+        Self { vertices, mids: middle }.with_mids(mids)
+    }
+
+    /// The loop on prescribed points, in the order of [`ClosedChart::outer`]; arcs are those of the unit circle.
+    ///
+    /// # Errors
+    /// [`Error::Count`].
+    pub fn prescribed(chart: &ClosedChart, points: &[[f64; 2]], mids: Mids) -> Result<Self, Error> {
+        let (given, needed) = (points.len(), chart.outer().len());
+        if given != needed {
+            return Err(Error::Count { given, needed });
+        }
+        let vertices = points.iter().map(|p| GridPoint::vertex(*p)).collect();
+        let bisector = |i: usize| {
+            let (p, q) = (points[i], points[(i + 1) % given]);
+            let sum = [p[0] + q[0], p[1] + q[1]];
+            let length = sum[0].hypot(sum[1]);
+            GridPoint::mid(sum.map(|c| c / length))
+        };
+        Ok(Self { vertices, mids: (0..given).map(bisector).collect() }.with_mids(mids))
+    }
+
+    /// The places of the loop's vertices.
+    pub fn vertices(&self) -> &[GridPoint] {
+        &self.vertices
+    }
+
+    /// The places of the loop's mid-edge nodes.
+    pub fn mids(&self) -> &[GridPoint] {
+        &self.mids
+    }
+
+    /// The middle of the straight edge `i`.
+    fn chord(&self, i: usize) -> GridPoint {
+        self.vertices[i].midpoint(self.vertices[(i + 1) % self.vertices.len()])
+    }
+
+    fn with_mids(mut self, mids: Mids) -> Self {
+        if mids == Mids::Chord {
+            self.mids = (0..self.mids.len()).map(|i| self.chord(i)).collect();
+        }
+        self
+    }
+
+    /// Moves the mid-edge node of edge `i` from the arc towards the chord: to the chord (`all_the_way`), or
+    /// half-way there.
+    pub(crate) fn lower(&mut self, i: usize, all_the_way: bool) {
+        let (m, c) = (self.mids[i], self.chord(i));
+        self.mids[i] = if all_the_way { c } else { GridPoint { x: (m.x + c.x) / 2, y: (m.y + c.y) / 2 } };
+    }
+}
+
+/// Per edge, its share of the circle, as a fraction of the whole turn: by length, none below [`SHORTEST`] of the
+/// mean, none above [`LONGEST`] of the turn.
+fn arc_shares(lengths: &[f64]) -> Vec<f64> {
+    let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
+    let raised: Vec<f64> = lengths.iter().map(|l| l.max(SHORTEST * mean)).collect();
+    let total: f64 = raised.iter().sum();
+    let mut shares: Vec<f64> = raised.iter().map(|l| l / total).collect();
+    let long = |share: &f64| *share > LONGEST;
+    // At most two edges can exceed 0.45 of the turn; what they lose goes to the others by their length.
+    let excess: f64 = shares.iter().filter(|s| long(s)).map(|s| s - LONGEST).sum();
+    let rest: f64 = shares.iter().filter(|s| !long(s)).sum();
+    if excess > 0.0 {
+        shares.iter_mut().for_each(|s| *s = if long(s) { LONGEST } else { *s * (1.0 + excess / rest) });
+    }
+    shares
+}
+
+/// The point of the unit circle at a fraction of the whole turn.
+fn on_circle(turn: f64) -> [f64; 2] {
+    let (sin, cos) = (TAU * turn).sin_cos();
+    [cos, sin]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arcs_are_neither_too_short_nor_too_long() {
+        for lengths in [vec![1.0, 1.0, 1e-9], vec![3.0, 4.0, 5.0], vec![1.0, 0.5, 0.5], vec![1.0, 1e-12, 1e-12, 1.0]] {
+            let shares = arc_shares(&lengths);
+            assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-14, "{shares:?}");
+            assert!(shares.iter().all(|s| *s > 1e-5 && *s < 0.4751), "{shares:?}");
+        }
+        assert_eq!(arc_shares(&[3.0, 4.0, 5.0]), [0.25, 4.0 / 12.0, 5.0 / 12.0]);
+    }
+}

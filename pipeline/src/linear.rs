@@ -1,0 +1,346 @@
+//! Linear map: chart -> P1 map of the disk that does not fold.
+//!
+//! The harmonic map by linear elements (cotangent weights) may fold where an edge has opposite angles adding up to
+//! more than pi: its weight is negative. Every triangle is tested exactly, on the numbers that are kept. If any is
+//! folded, negative weights near folded triangles become positive; the set of changed edges only grows, and ends
+//! at all negative edges, where the matrix is an M-matrix and the map a convex combination map, which cannot fold
+//! inside a convex boundary (Tutte 1963, doi 10.1112/plms/s3-13.1.743; Floater 1997,
+//! doi 10.1016/S0167-8396(96)00031-3). If rounding still folds something, mean value weights are tried, in a system
+//! of their own. If that folds too, the chart is too distorted for doubles and must be split.
+//!
+//! Guarantees: in a [`LinearMap`] every triangle, those of virtual fans included, turns left, exactly.
+
+use crate::boundary::Boundary;
+use crate::closed::ClosedChart;
+use crate::grid::{GridPoint, orientation};
+use crate::id::{EdgeId, FaceId, HalfEdgeId};
+use crate::sparse::{self, PRESCRIBED, Pattern};
+use crate::weights;
+
+/// After this many rounds of local changes, all negative edges are changed at once.
+const LOCAL_ROUNDS: u32 = 6;
+
+/// How a linear map was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Cotangent weights: the harmonic map.
+    Harmonic,
+    /// Cotangent weights, some negative ones raised.
+    MMatrix,
+    /// Mean value weights.
+    MeanValue,
+}
+
+/// A P1 map onto the disk in which no triangle is folded.
+#[derive(Clone, Debug)]
+pub struct LinearMap {
+    places: Vec<GridPoint>,
+    folded: usize,
+    edges_changed: usize,
+    method: Method,
+}
+
+/// Why there is no linear map.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// Every method folds a triangle in double precision.
+    #[error(
+        "the chart is too distorted for one map: {folded} triangles fold with positive weights too (first: {first}); \
+         it must be split"
+    )]
+    Folded {
+        /// How many triangles fold in the last method tried.
+        folded: usize,
+        /// The first of them, by its number in the chart.
+        first: FaceId,
+    },
+    /// The system could not be solved.
+    #[error("linear map: {0}")]
+    Solver(#[from] sparse::Error),
+}
+
+impl LinearMap {
+    /// The places of the vertices, those of the fans' centres last.
+    pub fn places(&self) -> &[GridPoint] {
+        &self.places
+    }
+
+    /// How many triangles the harmonic map folds.
+    pub fn folded(&self) -> usize {
+        self.folded
+    }
+
+    /// How many edges have other than harmonic weights.
+    pub fn edges_changed(&self) -> usize {
+        self.edges_changed
+    }
+
+    /// How the map was found.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// The map as a quadratic one, over the nodes of the closed chart: mid-edge nodes in the middle of straight
+    /// edges, those of the outer loop where the boundary has them.
+    pub fn raised(&self, chart: &ClosedChart, boundary: &Boundary) -> Vec<GridPoint> {
+        let mut nodes = vec![GridPoint::default(); chart.node_count()];
+        for (f, t) in chart.triangles().iter().enumerate() {
+            for (k, v) in t.iter().enumerate() {
+                let [a, b] = chart.ends(HalfEdgeId::at(3 * f + k)).map(|v| self.places[v.index()]);
+                nodes[chart.vertex_node(*v)] = self.places[v.index()];
+                nodes[chart.mid_node(HalfEdgeId::at(3 * f + k))] = a.midpoint(b);
+            }
+        }
+        for (h, mid) in chart.outer().iter().zip(boundary.mids()) {
+            nodes[chart.mid_node(*h)] = *mid;
+        }
+        nodes
+    }
+}
+
+/// Maps `chart` with its outer loop on the vertices of `boundary`.
+///
+/// # Errors
+/// [`Error::Folded`] when the chart must be split; [`Error::Solver`].
+pub fn linear_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap, Error> {
+    let harmonic = weights::harmonic(chart);
+    let places = solve_symmetric(chart, boundary, &harmonic)?;
+    let mut folds = folded(chart, &places);
+    let count = folds.len();
+    if count == 0 {
+        return Ok(LinearMap { places, folded: 0, edges_changed: 0, method: Method::Harmonic });
+    }
+    let mean_value = weights::mean_value(chart);
+    let raised = weights::replacements(chart, &harmonic, &mean_value);
+    let mut changed = vec![false; harmonic.len()];
+    for round in 0..=LOCAL_ROUNDS {
+        if !grow(chart, &harmonic, &folds, round == LOCAL_ROUNDS, &mut changed) {
+            continue;
+        }
+        let pick = |e: usize| if changed[e] { raised[e] } else { harmonic[e] };
+        let mixed: Vec<f64> = (0..harmonic.len()).map(pick).collect();
+        let places = solve_symmetric(chart, boundary, &mixed)?;
+        folds = folded(chart, &places);
+        if folds.is_empty() {
+            let edges_changed = changed.iter().filter(|c| **c).count();
+            return Ok(LinearMap { places, folded: count, edges_changed, method: Method::MMatrix });
+        }
+    }
+    let map = mean_value_map(chart, boundary)?;
+    Ok(LinearMap { folded: count, ..map })
+}
+
+/// The map by mean value weights.
+///
+/// # Errors
+/// As [`linear_map`].
+pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap, Error> {
+    let places = solve_mean_value(chart, boundary, &weights::mean_value(chart))?;
+    let folds = folded(chart, &places);
+    match folds.first() {
+        Some(first) => Err(Error::Folded { folded: folds.len(), first: *first }),
+        None => Ok(LinearMap { places, folded: 0, edges_changed: chart.edges().len(), method: Method::MeanValue }),
+    }
+}
+
+/// The harmonic P1 map as it is, folded or not: per vertex its place.
+///
+/// # Errors
+/// [`Error::Solver`].
+pub fn harmonic_places(chart: &ClosedChart, boundary: &Boundary) -> Result<Vec<GridPoint>, Error> {
+    solve_symmetric(chart, boundary, &weights::harmonic(chart))
+}
+
+/// The triangles that do not turn left, exactly.
+pub fn folded(chart: &ClosedChart, places: &[GridPoint]) -> Vec<FaceId> {
+    let place = |t: &[crate::id::VertexId; 3]| t.map(|v| places[v.index()]);
+    let turns_left = |p: [GridPoint; 3]| orientation(p[0], p[1], p[2]) > 0;
+    let all = chart.triangles().iter().enumerate();
+    all.filter(|(_, t)| !turns_left(place(t))).map(|(f, _)| FaceId::at(f)).collect()
+}
+
+/// Marks the negative edges at the vertices of folded triangles (or all of them); whether that marked any more.
+fn grow(chart: &ClosedChart, harmonic: &[f64], folds: &[FaceId], everywhere: bool, changed: &mut [bool]) -> bool {
+    let mut near = vec![everywhere; chart.vertex_count()];
+    folds.iter().flat_map(|f| chart.triangles()[f.index()]).for_each(|v| near[v.index()] = true);
+    let mut grown = false;
+    for (e, sides) in chart.edges().iter() {
+        let touches = chart.ends(sides[0]).iter().any(|v| near[v.index()]);
+        if sides.len() == 2 && harmonic[e.index()] < 0.0 && touches && !changed[e.index()] {
+            changed[e.index()] = true;
+            grown = true;
+        }
+    }
+    grown
+}
+
+/// The unknowns of a linear map: vertices that are not on the outer loop, and where those on it are.
+struct Unknowns {
+    number: Vec<u32>,
+    fixed: Vec<[f64; 2]>,
+    count: usize,
+}
+
+impl Unknowns {
+    fn new(chart: &ClosedChart, boundary: &Boundary) -> Self {
+        let mut number = vec![0; chart.vertex_count()];
+        let mut fixed = vec![[0.0; 2]; chart.vertex_count()];
+        for (h, place) in chart.outer().iter().zip(boundary.vertices()) {
+            let v = chart.ends(*h)[0].index();
+            number[v] = PRESCRIBED;
+            fixed[v] = place.uv();
+        }
+        let mut count = 0;
+        for n in number.iter_mut().filter(|n| **n != PRESCRIBED) {
+            *n = count;
+            count += 1;
+        }
+        Self { number, fixed, count: count as usize }
+    }
+
+    /// Adds `weight` times the places of prescribed neighbours to the right-hand side.
+    fn pull(&self, rhs: &mut [f64], unknown: u32, neighbour: usize, weight: f64) {
+        if unknown != PRESCRIBED && self.number[neighbour] == PRESCRIBED {
+            rhs[unknown as usize] += weight * self.fixed[neighbour][0];
+            rhs[self.count + unknown as usize] += weight * self.fixed[neighbour][1];
+        }
+    }
+
+    /// The places of all vertices, on the grid.
+    fn places(&self, solution: &[f64]) -> Vec<GridPoint> {
+        let free = |n: u32| [solution[n as usize], solution[self.count + n as usize]];
+        let uv = self.number.iter().zip(&self.fixed).map(|(n, f)| if *n == PRESCRIBED { *f } else { free(*n) });
+        uv.map(GridPoint::vertex).collect()
+    }
+}
+
+/// Solves for the places of the vertices with one weight per edge.
+fn solve_symmetric(chart: &ClosedChart, boundary: &Boundary, weights: &[f64]) -> Result<Vec<GridPoint>, Error> {
+    let unknowns = Unknowns::new(chart, boundary);
+    let ends = |e: usize| chart.ends(chart.edges().sides(EdgeId::at(e))[0]).map(|v| v.index());
+    let elements: Vec<[u32; 2]> = (0..weights.len()).map(|e| ends(e).map(|v| unknowns.number[v])).collect();
+    let pattern = Pattern::new(unknowns.count, &elements);
+    let mut values = pattern.zeros();
+    let mut rhs = vec![0.0; 2 * unknowns.count];
+    for (e, w) in weights.iter().enumerate() {
+        pattern.add(&mut values, e, &[[*w, -w], [-w, *w]]);
+        let [a, b] = ends(e);
+        unknowns.pull(&mut rhs, unknowns.number[a], b, *w);
+        unknowns.pull(&mut rhs, unknowns.number[b], a, *w);
+    }
+    if unknowns.count > 0 {
+        pattern.analyse()?.factorise(&values)?.solve(&mut rhs, 2);
+    }
+    Ok(unknowns.places(&rhs))
+}
+
+/// Solves for the places of the vertices with weights that differ between the ends of an edge.
+fn solve_mean_value(chart: &ClosedChart, boundary: &Boundary, weights: &[[f64; 2]]) -> Result<Vec<GridPoint>, Error> {
+    let unknowns = Unknowns::new(chart, boundary);
+    let mut entries = Vec::new();
+    let mut rhs = vec![0.0; 2 * unknowns.count];
+    let mut row_sums = vec![0.0; unknowns.count];
+    for (e, sides) in chart.edges().iter() {
+        let [a, b] = chart.ends(sides[0]).map(|v| v.index());
+        for (from, to, w) in [(a, b, weights[e.index()][0]), (b, a, weights[e.index()][1])] {
+            let (row, column) = (unknowns.number[from], unknowns.number[to]);
+            unknowns.pull(&mut rhs, row, to, w);
+            if row != PRESCRIBED {
+                row_sums[row as usize] += w;
+            }
+            if row != PRESCRIBED && column != PRESCRIBED {
+                entries.push((row, column, -w));
+            }
+        }
+    }
+    entries.extend(row_sums.iter().enumerate().map(|(i, s)| (i as u32, i as u32, *s)));
+    if unknowns.count > 0 {
+        sparse::solve_general(unknowns.count, &entries, &mut rhs, 2)?;
+    }
+    Ok(unknowns.places(&rhs))
+}
+
+/// Lowers mid-edge nodes of `boundary` where the raised map would come close to a folded corner: where a triangle
+/// has two boundary edges (an ear), its corner angle on a smooth boundary tends to pi. The node goes half-way to
+/// the chord, and if that is not enough, to the chord.
+pub fn lower_ears(chart: &ClosedChart, linear: &LinearMap, boundary: &mut Boundary) {
+    /// The least coefficient that is left alone, relative to that of the straight triangle.
+    const MARGIN: f64 = 0.01;
+    let mut nodes = linear.raised(chart, boundary);
+    for (i, h) in chart.outer().iter().enumerate() {
+        for all_the_way in [false, true] {
+            let face = h.face().index();
+            let det = crate::bernstein::ExactDet::new(chart.nodes(face).map(|n| nodes[n]));
+            let [p, q, r] = chart.triangles()[face].map(|v| linear.places[v.index()]);
+            let straight = 2.0 * orientation(p, q, r) as f64;
+            let least = det.corner.iter().chain(&det.edge).fold(f64::INFINITY, |m, c| m.min(*c as f64));
+            if least > MARGIN * straight {
+                break;
+            }
+            boundary.lower(i, all_the_way);
+            nodes[chart.mid_node(*h)] = boundary.mids()[i];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::boundary::Mids;
+    use crate::mesh::TriangleSoup;
+    use crate::{bernstein, decompose, repair, shapes};
+
+    fn closed(soup: &TriangleSoup) -> ClosedChart {
+        let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
+        ClosedChart::new(&decompose(&mesh).expect("one chart").charts()[0])
+    }
+
+    fn valid(chart: &ClosedChart, nodes: &[GridPoint]) -> bool {
+        let det = |f: usize| bernstein::ExactDet::new(chart.nodes(f).map(|n| nodes[n]));
+        (0..chart.triangles().len()).all(|f| det(f).validity() != bernstein::Validity::Invalid)
+    }
+
+    #[test]
+    fn every_disk_gets_a_map_that_raises_to_a_valid_quadratic_one() {
+        let shapes = [
+            shapes::disk(8),
+            shapes::disk_with_holes(17, 3),
+            shapes::bent_disk(12, 0.45),
+            shapes::folding_three(),
+            shapes::folding_six(),
+            shapes::sliver_strip(9),
+            shapes::cracked_patch(),
+            shapes::finger(12, 3),
+        ];
+        for (i, soup) in shapes.iter().enumerate() {
+            let chart = closed(soup);
+            let mut boundary = Boundary::circle(&chart, Mids::Arc);
+            let linear = linear_map(&chart, &boundary).expect("maps");
+            assert!(folded(&chart, linear.places()).is_empty());
+            lower_ears(&chart, &linear, &mut boundary);
+            assert!(valid(&chart, &linear.raised(&chart, &boundary)), "shape {i}");
+            let mean_value = mean_value_map(&chart, &boundary).expect("maps");
+            assert!(folded(&chart, mean_value.places()).is_empty());
+        }
+    }
+
+    #[test]
+    fn the_m_matrix_unfolds_what_the_harmonic_map_folds() {
+        for soup in [shapes::folding_three(), shapes::folding_six()] {
+            let chart = closed(&soup);
+            let boundary = Boundary::circle(&chart, Mids::Arc);
+            assert_eq!(folded(&chart, &harmonic_places(&chart, &boundary).expect("solves")).len(), 1);
+            let map = linear_map(&chart, &boundary).expect("maps");
+            assert_eq!((map.folded(), map.method()), (1, Method::MMatrix));
+            assert!(map.edges_changed() > 0);
+        }
+    }
+
+    #[test]
+    fn a_map_beyond_double_precision_is_refused() {
+        let chart = closed(&shapes::finger(12, 22));
+        let boundary = Boundary::circle(&chart, Mids::Arc);
+        let refused = linear_map(&chart, &boundary);
+        assert!(matches!(refused, Err(Error::Folded { .. })), "area ratio e^88: {refused:?}");
+    }
+}
