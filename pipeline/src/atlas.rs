@@ -13,6 +13,7 @@ pub struct Chart {
     pub(crate) triangles: Vec<[VertexId; 3]>,
     pub(crate) shapes: Vec<TriangleShape>,
     pub(crate) flagged: Vec<bool>,
+    pub(crate) scale: f64,
     pub(crate) edges: EdgeTable,
     pub(crate) outer: Vec<HalfEdgeId>,
     pub(crate) holes: Vec<Vec<HalfEdgeId>>,
@@ -39,7 +40,7 @@ impl Chart {
         &self.triangles
     }
 
-    /// The mollified shape of each triangle.
+    /// The mollified shape of each triangle, in a unit that is a power of two times that of the input.
     pub fn shapes(&self) -> &[TriangleShape] {
         &self.shapes
     }
@@ -47,6 +48,11 @@ impl Chart {
     /// Per triangle, whether mollification changed its area by more than 1 %.
     pub fn flagged(&self) -> &[bool] {
         &self.flagged
+    }
+
+    /// The mollified area of a triangle in the unit of the input, squared.
+    pub fn area(&self, face: usize) -> f64 {
+        self.shapes[face].area() / self.scale / self.scale
     }
 
     /// The edges, numbered within the chart.

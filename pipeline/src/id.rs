@@ -86,7 +86,7 @@ impl HalfEdgeId {
 
     /// The previous half-edge around the same triangle.
     pub fn prev(self) -> Self {
-        if self.0 % 3 == 0 { Self(self.0 + 2) } else { Self(self.0 - 1) }
+        if self.0.is_multiple_of(3) { Self(self.0 + 2) } else { Self(self.0 - 1) }
     }
 }
 

@@ -68,8 +68,7 @@ impl TriangleSoup {
         }
         for (point, p) in points.iter().enumerate() {
             for (axis, value) in ['x', 'y', 'z'].into_iter().zip(*p) {
-                // Written so that not-a-number is caught too.
-                if !(value.abs() <= LARGEST) {
+                if value.is_nan() || value.abs() > LARGEST {
                     return Err(SoupError::NotFinite { point, axis, value });
                 }
             }

@@ -1,0 +1,133 @@
+//! Premise (a): which triangles meet where, from the cells alone.
+
+use crate::id::FaceId;
+
+/// An arc of the boundary by its nodes: first vertex, middle, second vertex, with its triangle on the left.
+pub(super) type ArcNodes = [u32; 3];
+
+/// Why cells are no oriented surface with simple, disjoint boundary loops.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum IncidenceError {
+    /// There is no cell.
+    #[error("there is no triangle")]
+    Empty,
+    /// A cell names a node that does not exist, or one twice.
+    #[error("triangle {cell} has a node that is out of range or repeated")]
+    Nodes {
+        /// The cell.
+        cell: FaceId,
+    },
+    /// A node is used both as a vertex and as the middle of an edge, or in the middle of two edges.
+    #[error("node {node} (triangle {cell}) has several roles: vertex and middle, or middle of two edges")]
+    Role {
+        /// The node.
+        node: u32,
+        /// A cell that uses it.
+        cell: FaceId,
+    },
+    /// More than two triangles at an edge, two in the same direction, or with different middles.
+    #[error(
+        "the edge between nodes {from} and {to} (triangle {cell}) is not shared as an edge of an oriented surface is"
+    )]
+    Edge {
+        /// First end.
+        from: u32,
+        /// Second end.
+        to: u32,
+        /// A cell beside it.
+        cell: FaceId,
+    },
+    /// The boundary passes several times through a vertex.
+    #[error("the boundary passes more than once through node {node}")]
+    Pinched {
+        /// The node.
+        node: u32,
+    },
+}
+
+/// A directed side of a cell: ends in ascending order, then whether it runs that way, its middle, its cell.
+struct Side {
+    ends: [u32; 2],
+    forward: bool,
+    mid: u32,
+    cell: u32,
+}
+
+/// Checks the incidences; returns the boundary loops, each from its least node on, the chart on its left.
+pub(super) fn boundary_loops(cells: &[[u32; 6]], nodes: usize) -> Result<Vec<Vec<ArcNodes>>, IncidenceError> {
+    if cells.is_empty() {
+        return Err(IncidenceError::Empty);
+    }
+    check_nodes(cells, nodes)?;
+    let mut sides = all_sides(cells);
+    sides.sort_unstable_by_key(|s| (s.ends, s.mid, s.forward, s.cell));
+    let mut out: Vec<Option<[u32; 2]>> = vec![None; nodes];
+    let mut middle_of: Vec<Option<[u32; 2]>> = vec![None; nodes];
+    for edge in sides.chunk_by(|a, b| a.ends == b.ends) {
+        let [from, to] = edge[0].ends;
+        let error = IncidenceError::Edge { from, to, cell: FaceId(edge[0].cell) };
+        let role = &mut middle_of[edge[0].mid as usize];
+        if role.replace(edge[0].ends).is_some() {
+            return Err(IncidenceError::Role { node: edge[0].mid, cell: FaceId(edge[0].cell) });
+        }
+        match edge {
+            [one] => {
+                let [a, b] = if one.forward { [from, to] } else { [to, from] };
+                if out[a as usize].replace([one.mid, b]).is_some() {
+                    return Err(IncidenceError::Pinched { node: a });
+                }
+            }
+            [one, two] if one.mid == two.mid && one.forward != two.forward => {}
+            _ => return Err(error),
+        }
+    }
+    check_roles(cells, &middle_of)?;
+    Ok(follow(out))
+}
+
+fn check_nodes(cells: &[[u32; 6]], nodes: usize) -> Result<(), IncidenceError> {
+    for (i, cell) in cells.iter().enumerate() {
+        let mut sorted = *cell;
+        sorted.sort_unstable();
+        if sorted[5] as usize >= nodes || sorted.windows(2).any(|w| w[0] == w[1]) {
+            return Err(IncidenceError::Nodes { cell: FaceId::at(i) });
+        }
+    }
+    Ok(())
+}
+
+/// No vertex may be the middle of an edge.
+fn check_roles(cells: &[[u32; 6]], middle_of: &[Option<[u32; 2]>]) -> Result<(), IncidenceError> {
+    for (i, cell) in cells.iter().enumerate() {
+        if let Some(node) = cell[..3].iter().find(|n| middle_of[**n as usize].is_some()) {
+            return Err(IncidenceError::Role { node: *node, cell: FaceId::at(i) });
+        }
+    }
+    Ok(())
+}
+
+fn all_sides(cells: &[[u32; 6]]) -> Vec<Side> {
+    let side = |i: usize, cell: &[u32; 6], k: usize| {
+        let (a, b) = (cell[k], cell[(k + 1) % 3]);
+        Side { ends: [a.min(b), a.max(b)], forward: a < b, mid: cell[3 + k], cell: i as u32 }
+    };
+    cells.iter().enumerate().flat_map(|(i, c)| (0..3).map(move |k| side(i, c, k))).collect()
+}
+
+/// Strings the boundary arcs together. Each vertex has at most one arc out; the boundary of oriented triangles
+/// also has as many in, so every walk returns to its start. Ends because each arc is taken once.
+fn follow(mut out: Vec<Option<[u32; 2]>>) -> Vec<Vec<ArcNodes>> {
+    let mut loops = Vec::new();
+    for start in 0..out.len() {
+        let mut turn = Vec::new();
+        let mut at = start as u32;
+        while let Some([mid, to]) = out[at as usize].take() {
+            turn.push([at, mid, to]);
+            at = to;
+        }
+        if !turn.is_empty() {
+            loops.push(turn);
+        }
+    }
+    loops
+}

@@ -1,0 +1,173 @@
+//! Certify: the proof that a quadratic map is one-to-one.
+//!
+//! **Theorem.** Let F be continuous on a chart and quadratic on each triangle, with
+//! (a) every edge in one or two triangles, the two traversing it in opposite directions with the same three nodes;
+//! (b) det > 0 on every closed triangle;
+//! (c) one boundary loop, the outer one, star-shaped about 0 and winding +1: for every arc with Bezier points
+//!     (p0, c, p1) the signs of p0 x c, p0 x p1 and c x p1 are positive;
+//! (d) every other loop, traversed with the chart on its left, star-shaped about a point c_k (the three products,
+//!     relative to c_k, are negative) and winding -1.
+//! Then F is one-to-one onto the region inside the outer loop minus the holes.
+//!
+//! *Why.* Off the image of the boundary the number N(q) of preimages of q equals its winding number W(q) = [q
+//! inside the outer loop] - sum over k of [q inside hole k], as every preimage counts +1. So N <= 1, and holes
+//! neither overlap nor leave the disk. Near any point the map has local degree at least 1; two points with the
+//! same image would give N >= 2 nearby, or N >= 1 > W beside a loop: a contradiction.
+//!
+//! Everything is decided on integers, exactly, from the cells and the places of the nodes alone: [`prove`] knows
+//! nothing of how the map was made. Only it can make a [`CertifiedMap`].
+
+mod arcs;
+mod incidence;
+mod star;
+
+use crate::bernstein::{ExactDet, Validity};
+use crate::grid::GridPoint;
+use crate::id::FaceId;
+pub use arcs::Arc;
+pub use incidence::IncidenceError;
+pub use star::star_centre;
+
+/// A quadratic map as it is written: cells of six nodes (vertices, then the middles of 01, 12, 20), the places of
+/// the nodes, and a point in each hole from which the whole loop can be seen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlanarMap {
+    /// The nodes of each triangle.
+    pub cells: Vec<[u32; 6]>,
+    /// The place of each node.
+    pub nodes: Vec<GridPoint>,
+    /// One point per hole, in any order.
+    pub hole_centres: Vec<GridPoint>,
+}
+
+/// What was proven, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Certificate {
+    /// Triangles proven by the signs of their Bernstein coefficients.
+    pub by_bounds: usize,
+    /// Triangles proven by strict copositivity.
+    pub by_exact: usize,
+    /// The depth of subdivision behind the bounds.
+    pub depth: u32,
+    /// A lower bound of the jacobian determinant (on the reference triangle of area 1/2) over all triangles.
+    pub det_lower_bound: f64,
+    /// Arcs of the outer loop.
+    pub outer_arcs: usize,
+    /// For each hole, in the order of the loops, its centre.
+    pub hole_centres: Vec<GridPoint>,
+}
+
+/// A map that is proven to be one-to-one. Made by [`prove`] only.
+#[derive(Clone, Debug)]
+pub struct CertifiedMap {
+    map: PlanarMap,
+    certificate: Certificate,
+}
+
+impl CertifiedMap {
+    /// The map.
+    pub fn map(&self) -> &PlanarMap {
+        &self.map
+    }
+
+    /// The proof in numbers.
+    pub fn certificate(&self) -> &Certificate {
+        &self.certificate
+    }
+}
+
+/// Why a map is not proven.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// The cells are no surface with boundary.
+    #[error(transparent)]
+    Incidence(#[from] IncidenceError),
+    /// A vertex is off the grid on which midpoints are exact.
+    #[error("vertex node {node} is no multiple of 2^-52")]
+    OffGrid {
+        /// The node.
+        node: u32,
+    },
+    /// The jacobian of some triangles is not positive everywhere.
+    #[error("{count} triangles are invalid: their jacobian is not positive everywhere (first: {first})")]
+    InvalidTriangles {
+        /// How many.
+        count: usize,
+        /// The first of them.
+        first: FaceId,
+        /// All of them.
+        all: Vec<FaceId>,
+    },
+    /// No loop, or more than one, is an outer one.
+    #[error("{count} of {loops} boundary loops run around the origin star-shaped, winding once; exactly one must")]
+    OuterLoop {
+        /// How many do.
+        count: usize,
+        /// How many loops there are.
+        loops: usize,
+    },
+    /// A loop cannot be seen from any of the given centres.
+    #[error("the hole whose loop begins at node {node} is not star-shaped about any of the {centres} given centres")]
+    Hole {
+        /// The first node of its loop.
+        node: u32,
+        /// How many centres were given.
+        centres: usize,
+    },
+}
+
+/// Proves that `map` is one-to-one.
+///
+/// # Errors
+/// The first part of the theorem's premises that fails, with its evidence.
+pub fn prove(map: PlanarMap) -> Result<CertifiedMap, Error> {
+    let loops = incidence::boundary_loops(&map.cells, map.nodes.len())?;
+    let vertices = map.cells.iter().flat_map(|c| &c[..3]);
+    if let Some(node) = vertices.copied().find(|n| !map.nodes[*n as usize].is_vertex()) {
+        return Err(Error::OffGrid { node });
+    }
+    let mut certificate = prove_triangles(&map)?;
+    let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| l.iter().map(|a| arcs::place(a, &map.nodes)).collect()).collect();
+    let origin = GridPoint::default();
+    let outer: Vec<usize> = (0..arcs.len()).filter(|i| arcs::winds_once(&arcs[*i], origin, 1)).collect();
+    let [outer] = outer[..] else { return Err(Error::OuterLoop { count: outer.len(), loops: loops.len() }) };
+    certificate.outer_arcs = arcs[outer].len();
+    for (i, hole) in arcs.iter().enumerate().filter(|(i, _)| *i != outer) {
+        let seen_from = map.hole_centres.iter().find(|c| arcs::winds_once(hole, **c, -1));
+        let centres = map.hole_centres.len();
+        certificate.hole_centres.push(*seen_from.ok_or(Error::Hole { node: loops[i][0][0], centres })?);
+    }
+    Ok(CertifiedMap { map, certificate })
+}
+
+/// Premise (b).
+fn prove_triangles(map: &PlanarMap) -> Result<Certificate, Error> {
+    let mut certificate = Certificate {
+        by_bounds: 0,
+        by_exact: 0,
+        depth: 0,
+        det_lower_bound: f64::INFINITY,
+        outer_arcs: 0,
+        hole_centres: vec![],
+    };
+    let mut invalid = Vec::new();
+    for (f, cell) in map.cells.iter().enumerate() {
+        let det = ExactDet::new(cell.map(|n| map.nodes[n as usize]));
+        match det.validity() {
+            Validity::ByBounds => certificate.by_bounds += 1,
+            Validity::ByCopositivity => certificate.by_exact += 1,
+            Validity::Invalid => invalid.push(FaceId::at(f)),
+        }
+        let (bound, depth) = det.lower_bound();
+        certificate.depth = certificate.depth.max(depth);
+        // A valid triangle has a positive determinant even where the bound of that depth is not.
+        certificate.det_lower_bound = certificate.det_lower_bound.min(bound.max(0.0));
+    }
+    match invalid.first() {
+        Some(first) => Err(Error::InvalidTriangles { count: invalid.len(), first: *first, all: invalid }),
+        None => Ok(certificate),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,116 @@
+//! One chart through the stages: linear map, quadratic map, untangling, certificate.
+
+use crate::atlas::Chart;
+use crate::boundary::{Boundary, Mids};
+use crate::certify::{self, CertifiedMap, PlanarMap, prove};
+use crate::closed::ClosedChart;
+use crate::grid::GridPoint;
+use crate::linear::{self, LinearMap, linear_map, lower_ears};
+use crate::quadratic::{QuadraticMap, least_det, quadratic_map};
+use crate::sparse;
+use crate::untangle::{self, Untangled, untangle};
+
+/// The order of the finite elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Order {
+    /// Linear: mid-edge nodes stay in the middle of straight edges.
+    Linear,
+    /// Quadratic: curved triangles.
+    #[default]
+    Quadratic,
+}
+
+/// A chart with a linear map and, for quadratic elements, the harmonic map. The feasible start is certified
+/// already, so that there is always something to publish.
+#[derive(Clone, Debug)]
+pub struct MappedChart {
+    closed: ClosedChart,
+    linear: LinearMap,
+    start: Vec<GridPoint>,
+    certified_start: CertifiedMap,
+    harmonic: Option<Result<QuadraticMap, sparse::Error>>,
+}
+
+/// Why a chart cannot be mapped as a whole. Both mean: split it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MapError {
+    /// No linear map.
+    #[error(transparent)]
+    Linear(#[from] linear::Error),
+    /// The raised linear map is not one-to-one in double precision.
+    #[error("the chart is too distorted for one map: {0}; it must be split")]
+    Start(certify::Error),
+}
+
+/// A chart with its certified map and the account of how it was found.
+#[derive(Clone, Debug)]
+pub struct CertifiedChart {
+    /// The map. Nodes: the vertices of the chart, then its edges, in its numbering.
+    pub certified: CertifiedMap,
+    /// The linear map.
+    pub linear: LinearMap,
+    /// The harmonic map, where it was asked for and could be computed.
+    pub harmonic: Option<Harmonic>,
+    /// What untangling did, where there was a harmonic map.
+    pub untangle: Option<untangle::Report>,
+    /// Why there is no harmonic map although it was asked for: the map is the raised linear one then.
+    pub unsolved: Option<sparse::Error>,
+}
+
+/// The harmonic map in numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Harmonic {
+    /// Per triangle of the chart, whether it is invalid in the harmonic map.
+    pub invalid: Vec<bool>,
+    /// The least jacobian determinant, per unit of mollified area of the triangle in space, in the unit of the
+    /// shapes.
+    pub det_min: f64,
+}
+
+/// Maps `chart` linearly and, for quadratic elements, harmonically.
+///
+/// # Errors
+/// [`MapError`]: the chart must be split.
+pub fn map_chart(chart: &Chart, order: Order) -> Result<MappedChart, MapError> {
+    let closed = ClosedChart::new(chart);
+    let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
+    let mut boundary = Boundary::circle(&closed, mids);
+    let linear = linear_map(&closed, &boundary)?;
+    lower_ears(&closed, &linear, &mut boundary);
+    let start = linear.raised(&closed, &boundary);
+    let centres = (0..closed.loops().len()).map(|k| start[closed.centre_node(k)]).collect();
+    let certified_start = prove(planar(&closed, &start, centres)).map_err(MapError::Start)?;
+    let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary));
+    Ok(MappedChart { closed, linear, start, certified_start, harmonic })
+}
+
+/// Untangles the harmonic map of a chart and certifies the result; where that cannot be proven, the result is the
+/// feasible start.
+pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
+    let MappedChart { closed, linear, start, certified_start, harmonic } = mapped;
+    let base = CertifiedChart { certified: certified_start, linear, harmonic: None, untangle: None, unsolved: None };
+    let map = match harmonic {
+        None => return base,
+        Some(Err(unsolved)) => return CertifiedChart { unsolved: Some(unsolved), ..base },
+        Some(Ok(map)) => map,
+    };
+    let mut invalid = vec![false; closed.own_triangles()];
+    map.invalid().iter().for_each(|f| invalid[f.index()] = true);
+    let found = Harmonic { invalid, det_min: least_det(&closed, map.nodes()) };
+    let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &start, &map);
+    let certified = match prove(planar(&closed, &nodes, hole_centres)) {
+        Ok(certified) => certified,
+        Err(_) => {
+            report.method = untangle::Method::Start;
+            report.energy = report.energy_start;
+            base.certified
+        }
+    };
+    CertifiedChart { certified, harmonic: Some(found), untangle: Some(report), ..base }
+}
+
+/// The part of a map that is published: the chart without its fans.
+fn planar(closed: &ClosedChart, nodes: &[GridPoint], hole_centres: Vec<GridPoint>) -> PlanarMap {
+    let cells = (0..closed.own_triangles()).map(|f| closed.nodes(f).map(|n| n as u32)).collect();
+    PlanarMap { cells, nodes: nodes[..closed.own_nodes()].to_vec(), hole_centres }
+}

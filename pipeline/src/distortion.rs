@@ -1,0 +1,170 @@
+//! How a certified map distorts the surface, triangle by triangle and for a chart as a whole.
+//!
+//! Distortion is measured against the triangles in space, with their mollified shapes. All numbers are finite.
+
+use crate::atlas::Chart;
+use crate::bernstein::{self, ExactDet};
+use crate::certify::CertifiedMap;
+use crate::element;
+
+/// The fields of one triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellFields {
+    /// Least jacobian determinant, per unit of mollified area.
+    pub det_min: f64,
+    /// Largest jacobian determinant, per unit of mollified area.
+    pub det_max: f64,
+    /// `det_min / det_max`, in (0, 1].
+    pub jacobian_ratio: f64,
+    /// The largest sigma1 / sigma2 at the six nodes, at least 1.
+    pub conformal_distortion: f64,
+    /// Area in the plane per area in space.
+    pub area_scale: f64,
+}
+
+/// The distortion of a chart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// The conformal distortion that half of the area does not exceed.
+    pub conformal_median: f64,
+    /// The conformal distortion that 99 % of the area does not exceed.
+    pub conformal_p99: f64,
+    /// The area scale, summed over stars of two rings: its 99.9 % over its 0.1 % quantile, weighted by area.
+    pub area_ratio: f64,
+}
+
+/// The fields of every triangle of `chart` under `map`.
+pub fn fields(chart: &Chart, map: &CertifiedMap) -> Vec<CellFields> {
+    (0..chart.triangles().len()).map(|f| cell_fields(chart, map, f)).collect()
+}
+
+fn cell_fields(chart: &Chart, map: &CertifiedMap, face: usize) -> CellFields {
+    let nodes = map.map().cells[face].map(|n| map.map().nodes[n as usize]);
+    let coefficients = ExactDet::new(nodes).coefficients();
+    let (least, largest) = bernstein::range(coefficients);
+    let doubled_area = 2.0 * chart.area(face);
+    let (det_min, det_max) = (finite(least / doubled_area), finite(largest / doubled_area));
+    CellFields {
+        det_min,
+        det_max,
+        jacobian_ratio: (least / largest).clamp(f64::MIN_POSITIVE, 1.0),
+        conformal_distortion: conformal_distortion(chart, face, nodes.map(|n| n.uv())),
+        area_scale: finite(area_in_plane(&coefficients) / chart.area(face)),
+    }
+}
+
+/// The integral of a quadratic over the reference triangle is the mean of its coefficients times the area 1/2.
+fn area_in_plane(coefficients: &[f64; 6]) -> f64 {
+    coefficients.iter().sum::<f64>() / 12.0
+}
+
+/// Brings a positive quantity that overflowed or underflowed back into the range of normal doubles.
+fn finite(x: f64) -> f64 {
+    x.clamp(f64::MIN_POSITIVE, f64::MAX)
+}
+
+/// The largest ratio of singular values of the map from the triangle in space, at the six nodes.
+fn conformal_distortion(chart: &Chart, face: usize, x: [[f64; 2]; 6]) -> f64 {
+    let p = chart.shapes()[face].in_plane();
+    let (length, shift, height) = (p[1][0], p[2][0], p[2][1]);
+    let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
+    let at = |l: &[f64; 3]| {
+        let g = element::gradients(*l);
+        let along = |dir: usize, k: usize| (1..6).map(|n| g[n][dir] * d[n][k]).sum::<f64>();
+        let (a, b) = ([along(0, 0), along(0, 1)], [along(1, 0), along(1, 1)]);
+        let det = (a[0] * b[1] - a[1] * b[0]) / (length * height);
+        let first = a.map(|v| v / length);
+        let second = [0, 1].map(|k| (b[k] - shift * first[k]) / height);
+        // |f_z| + |f_conj z| is the larger singular value.
+        let stretch = 0.5
+            * ((first[0] + second[1]).hypot(first[1] - second[0]) + (first[0] - second[1]).hypot(first[1] + second[0]));
+        stretch * stretch / det
+    };
+    let largest = element::NODES
+        .iter()
+        .map(at)
+        .fold(1.0, |m, r| if r.is_finite() && r > 0.0 { f64::max(m, r) } else { f64::MAX });
+    largest.clamp(1.0, f64::MAX)
+}
+
+/// Sums up the fields of a chart. Triangles whose shape mollification changed by more than 1 % are left out of the
+/// conformal quantiles (unless all are).
+pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summary {
+    let all_flagged = chart.flagged().iter().all(|f| *f);
+    let counted = |f: &usize| all_flagged || !chart.flagged()[*f];
+    let weighted = |f: usize| (fields[f].conformal_distortion, chart.shapes()[f].area());
+    let mut conformal: Vec<_> = (0..fields.len()).filter(counted).map(weighted).collect();
+    let mut scales = star_scales(chart, map);
+    let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
+    let [low, high] = quantiles(&mut scales, [0.001, 0.999]);
+    Summary { conformal_median, conformal_p99, area_ratio: finite(high / low) }
+}
+
+/// Per vertex, the area scale of its star of two rings, with the area of its own star as weight.
+fn star_scales(chart: &Chart, map: &CertifiedMap) -> Vec<(f64, f64)> {
+    let mut around: Vec<Vec<u32>> = vec![Vec::new(); chart.vertices().len()];
+    for (f, t) in chart.triangles().iter().enumerate() {
+        t.iter().for_each(|v| around[v.index()].push(f as u32));
+    }
+    let place = |n: u32| map.map().nodes[n as usize];
+    let plane: Vec<f64> =
+        map.map().cells.iter().map(|c| area_in_plane(&ExactDet::new(c.map(place)).coefficients())).collect();
+    let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
+    let two_rings = |v: usize| {
+        let ring = around[v].iter().flat_map(|f| chart.triangles()[*f as usize]);
+        let mut faces: Vec<u32> = ring.flat_map(|u| around[u.index()].iter().copied()).collect();
+        faces.sort_unstable();
+        faces.dedup();
+        let sum = |area: &[f64]| faces.iter().map(|f| area[*f as usize]).sum::<f64>();
+        let weight = around[v].iter().map(|f| space[*f as usize]).sum::<f64>();
+        (sum(&plane) / sum(&space), weight)
+    };
+    (0..around.len()).map(two_rings).collect()
+}
+
+/// The values at the given shares of the total weight.
+fn quantiles<const N: usize>(weighted: &mut [(f64, f64)], shares: [f64; N]) -> [f64; N] {
+    weighted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = weighted.iter().map(|w| w.1).sum();
+    shares.map(|share| {
+        let mut left = share * total;
+        let reached = weighted.iter().find(|w| {
+            left -= w.1;
+            left <= 0.0
+        });
+        reached.or(weighted.last()).map_or(1.0, |w| w.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Order, decompose, finish_chart, map_chart, repair, shapes};
+
+    #[test]
+    fn quantiles_follow_the_weights() {
+        let mut values = [(3.0, 1.0), (1.0, 1.0), (2.0, 8.0)];
+        assert_eq!(quantiles(&mut values, [0.05, 0.5, 0.95]), [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn every_field_is_finite_and_in_its_range() {
+        for (soup, scale) in [(shapes::disk(6), 1.0), (shapes::sliver_strip(10), 1.0), (shapes::disk(6), 1e-90)] {
+            let points = soup.points().iter().map(|p| p.map(|c| c * scale)).collect();
+            let soup = crate::mesh::TriangleSoup::new(points, soup.triangles().to_vec()).expect("sound");
+            let mesh = repair(&soup, &Default::default()).expect("a surface").mesh;
+            let atlas = decompose(&mesh).expect("one chart");
+            let chart = &atlas.charts()[0];
+            let done = finish_chart(map_chart(chart, Order::Quadratic).expect("maps"));
+            let fields = fields(chart, &done.certified);
+            for f in &fields {
+                assert!(f.det_min > 0.0 && f.det_min <= f.det_max && f.det_max.is_finite(), "{f:?}");
+                assert!(f.jacobian_ratio > 0.0 && f.jacobian_ratio <= 1.0);
+                assert!(f.conformal_distortion >= 1.0 && f.conformal_distortion.is_finite());
+                assert!(f.area_scale > 0.0 && f.area_scale.is_finite());
+            }
+            let s = summary(chart, &done.certified, &fields);
+            assert!(s.conformal_median <= s.conformal_p99 && s.area_ratio >= 1.0 && s.area_ratio.is_finite());
+        }
+    }
+}

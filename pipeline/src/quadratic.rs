@@ -1,0 +1,164 @@
+//! Quadratic map: the harmonic map by P2 finite elements.
+//!
+//! u and v solve two Laplace problems over the chart (holes closed by virtual fans) by 6-node triangles, with the
+//! nodes of the outer loop prescribed: one factorisation, two right-hand sides. Triangles are flat in space, their
+//! metric is constant. The map minimises the Dirichlet energy among all quadratic maps with these boundary
+//! values; it need not be valid, and typically a few triangles in a thousand are not.
+
+use crate::bernstein::{self, ExactDet, Validity};
+use crate::boundary::Boundary;
+use crate::closed::ClosedChart;
+use crate::element;
+use crate::grid::GridPoint;
+use crate::id::FaceId;
+use crate::sparse::{self, PRESCRIBED, Pattern};
+
+/// The harmonic map by quadratic elements, on the grid, valid or not.
+#[derive(Clone, Debug)]
+pub struct QuadraticMap {
+    nodes: Vec<GridPoint>,
+    invalid: Vec<FaceId>,
+    energy: f64,
+}
+
+impl QuadraticMap {
+    /// The places of all nodes of the closed chart.
+    pub fn nodes(&self) -> &[GridPoint] {
+        &self.nodes
+    }
+
+    /// The triangles of the chart whose jacobian is not positive everywhere.
+    pub fn invalid(&self) -> &[FaceId] {
+        &self.invalid
+    }
+
+    /// The Dirichlet energy, that of the fans included: no map with this boundary has less.
+    pub fn energy(&self) -> f64 {
+        self.energy
+    }
+}
+
+/// Computes the harmonic map of `chart` with its outer loop on `boundary`.
+///
+/// # Errors
+/// [`sparse::Error`] when the system cannot be factorised.
+pub fn quadratic_map(chart: &ClosedChart, boundary: &Boundary) -> Result<QuadraticMap, sparse::Error> {
+    let mut number = vec![0_u32; chart.node_count()];
+    let mut uv = vec![[0.0; 2]; chart.node_count()];
+    for (i, h) in chart.outer().iter().enumerate() {
+        let vertex = chart.vertex_node(chart.ends(*h)[0]);
+        for (node, place) in [(vertex, boundary.vertices()[i]), (chart.mid_node(*h), boundary.mids()[i])] {
+            number[node] = PRESCRIBED;
+            uv[node] = place.uv();
+        }
+    }
+    let mut unknowns = 0;
+    for n in number.iter_mut().filter(|n| **n != PRESCRIBED) {
+        *n = unknowns;
+        unknowns += 1;
+    }
+    let solution = solve(chart, &number, &uv, unknowns as usize)?;
+    for (node, n) in number.iter().enumerate().filter(|(_, n)| **n != PRESCRIBED) {
+        uv[node] = [solution[*n as usize], solution[(unknowns + n) as usize]];
+    }
+    let nodes = to_grid(chart, &uv);
+    let invalid = invalid_triangles(chart, &nodes);
+    let energy = energy(chart, &nodes);
+    Ok(QuadraticMap { nodes, invalid, energy })
+}
+
+/// Solves both Laplace problems; returns the unknown values of u, then those of v.
+fn solve(chart: &ClosedChart, number: &[u32], uv: &[[f64; 2]], unknowns: usize) -> Result<Vec<f64>, sparse::Error> {
+    let faces = 0..chart.triangles().len();
+    let elements: Vec<[u32; 6]> = faces.clone().map(|f| chart.nodes(f).map(|n| number[n])).collect();
+    let pattern = Pattern::new(unknowns, &elements);
+    let mut values = pattern.zeros();
+    let mut rhs = vec![0.0; 2 * unknowns];
+    for f in faces {
+        let stiffness = element::stiffness(&chart.shapes()[f]);
+        pattern.add(&mut values, f, &stiffness);
+        let nodes = chart.nodes(f);
+        for (i, row) in elements[f].iter().enumerate().filter(|(_, r)| **r != PRESCRIBED) {
+            for j in (0..6).filter(|j| elements[f][*j] == PRESCRIBED) {
+                rhs[*row as usize] -= stiffness[i][j] * uv[nodes[j]][0];
+                rhs[unknowns + *row as usize] -= stiffness[i][j] * uv[nodes[j]][1];
+            }
+        }
+    }
+    if unknowns > 0 {
+        pattern.analyse()?.factorise(&values)?.solve(&mut rhs, 2);
+    }
+    Ok(rhs)
+}
+
+/// Rounds the nodes of a closed chart to the grid: vertices to that of vertices, all others to that of mid-edge
+/// nodes.
+pub(crate) fn to_grid(chart: &ClosedChart, uv: &[[f64; 2]]) -> Vec<GridPoint> {
+    let own = chart.own_vertices();
+    let centres = chart.own_nodes()..chart.own_nodes() + chart.loops().len();
+    let is_vertex = |n: usize| n < own || centres.contains(&n);
+    uv.iter().enumerate().map(|(n, p)| if is_vertex(n) { GridPoint::vertex(*p) } else { GridPoint::mid(*p) }).collect()
+}
+
+/// The jacobian coefficients of a triangle.
+pub(crate) fn det(chart: &ClosedChart, nodes: &[GridPoint], face: usize) -> ExactDet {
+    ExactDet::new(chart.nodes(face).map(|n| nodes[n]))
+}
+
+/// The triangles of the chart (not the fans) that are invalid, exactly.
+pub(crate) fn invalid_triangles(chart: &ClosedChart, nodes: &[GridPoint]) -> Vec<FaceId> {
+    let own = 0..chart.own_triangles();
+    own.filter(|f| det(chart, nodes, *f).validity() == Validity::Invalid).map(FaceId::at).collect()
+}
+
+/// The least jacobian of a map over all triangles of the chart, per unit of mollified area of the triangle in
+/// space, in the unit of the shapes.
+pub fn least_det(chart: &ClosedChart, nodes: &[GridPoint]) -> f64 {
+    let relative =
+        |f: usize| bernstein::range(det(chart, nodes, f).coefficients()).0 / (2.0 * chart.shapes()[f].area());
+    (0..chart.own_triangles()).map(relative).fold(f64::INFINITY, f64::min)
+}
+
+/// The Dirichlet energy of a map of the closed chart, fans included.
+pub fn energy(chart: &ClosedChart, nodes: &[GridPoint]) -> f64 {
+    let one =
+        |f: usize| element::energy(&element::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| nodes[n].uv()));
+    (0..chart.triangles().len()).map(one).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::boundary::Mids;
+    use crate::{decompose, linear, repair, shapes};
+
+    #[test]
+    fn the_map_has_no_more_energy_than_the_raised_linear_one() {
+        let mesh = repair(&shapes::disk_with_holes(13, 2), &Default::default()).expect("a surface").mesh;
+        let chart = ClosedChart::new(&decompose(&mesh).expect("one chart").charts()[0]);
+        let boundary = Boundary::circle(&chart, Mids::Arc);
+        let start = linear::linear_map(&chart, &boundary).expect("maps").raised(&chart, &boundary);
+        let map = quadratic_map(&chart, &boundary).expect("solves");
+        assert!(map.energy() < energy(&chart, &start));
+        // Moving any node raises the energy: the map is the minimiser.
+        for node in [20, chart.own_vertices() + 100, chart.own_nodes(), chart.node_count() - 1] {
+            let mut moved = map.nodes().to_vec();
+            moved[node].x += 1 << 40;
+            assert!(energy(&chart, &moved) > map.energy());
+        }
+    }
+
+    #[test]
+    fn a_flat_round_disk_is_mapped_to_itself() {
+        let mesh = repair(&shapes::flat_disk(6), &Default::default()).expect("a surface").mesh;
+        let chart = ClosedChart::new(&decompose(&mesh).expect("one chart").charts()[0]);
+        let boundary = Boundary::circle(&chart, Mids::Chord);
+        let map = quadratic_map(&chart, &boundary).expect("solves");
+        assert!(map.invalid().is_empty());
+        // The start of the loop may be turned: distances from the centre are kept.
+        for (v, p) in mesh.points().iter().enumerate() {
+            let [x, y] = map.nodes()[v].uv();
+            assert!((x.hypot(y) - p[0].hypot(p[1])).abs() < 1e-13);
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Untangle: towards the harmonic map, inside the certified ones.
+//!
+//! Minimises the Dirichlet energy 1/2 int |grad u|^2 + |grad v|^2 (on the surface: distortion is measured against
+//! the triangles in space) under the constraint that every jacobian is positive, with the outer boundary fixed.
+//!
+//! * **Nothing to do** where the harmonic map is valid and every hole can be seen from a point inside.
+//! * **The patch path**, where few triangles are invalid: only a few rings around them move. A regularised penalty
+//!   that accepts an invalid start pulls them over (Garanzha and co-workers 2021, doi 10.1145/3450626.3459847), then
+//!   a log barrier brings the patch back towards the harmonic map. Patches that do not yield grow.
+//! * **The feasible path** always succeeds: the linear map, raised to quadratic elements, is valid; a log barrier
+//!   method descends from it and never leaves the valid set. All nodes inside move, and a star centre for each hole.
+//! * **The start itself**, if the result of the feasible path does not survive rounding to the grid, or its
+//!   systems are too large.
+//!
+//! The barrier acts on the six Bernstein coefficients of each jacobian (sufficient for validity), relative to their
+//! size in the start, above a thousandth of it; its weight falls from a tenth to a millionth of the energy. Steps
+//! are Newton's with the exactly projected curvature of [`terms`], cut short of the nearest floor. Every loop has a
+//! fixed limit. As harmonic map, start and result all include the energy of the virtual fans (with free nodes),
+//! the harmonic energy is a lower bound of the result's.
+
+mod feasible;
+mod newton;
+mod patch;
+mod penalty;
+mod problem;
+mod region;
+mod terms;
+
+use crate::certify::{Arc, star_centre};
+use crate::closed::ClosedChart;
+use crate::grid::GridPoint;
+use crate::quadratic::{self, QuadraticMap, energy, invalid_triangles};
+use problem::Places;
+
+/// Above this share of invalid triangles the feasible path is taken at once.
+const FEW: f64 = 0.05;
+
+/// Factors larger than this (bytes) are not made: a fixed number, so that results do not depend on the machine.
+const LARGEST_FACTOR: usize = 8 << 30;
+
+/// How the result was found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// The harmonic map was valid.
+    Harmonic,
+    /// Patches around invalid triangles moved.
+    Patch,
+    /// A barrier method from the raised linear map.
+    Feasible,
+    /// The raised linear map itself.
+    Start,
+}
+
+/// What untangling did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// How the result was found.
+    pub method: Method,
+    /// Newton steps, over all patches and attempts.
+    pub iterations: usize,
+    /// Nodes of the chart whose place differs from that in the harmonic map.
+    pub nodes_moved: usize,
+    /// Dirichlet energy of the harmonic map: a lower bound.
+    pub energy_harmonic: f64,
+    /// Dirichlet energy of the raised linear map.
+    pub energy_start: f64,
+    /// Dirichlet energy of the result.
+    pub energy: f64,
+    /// The gradient of the last barrier problem in the norm of its inverse Hessian, relative to the root of twice
+    /// the energy; the largest over all patches.
+    pub gradient_norm: f64,
+}
+
+/// A map with a point in each hole, believed to be valid: [`crate::certify`] decides.
+#[derive(Clone, Debug)]
+pub struct Untangled {
+    /// The places of all nodes of the closed chart.
+    pub nodes: Vec<GridPoint>,
+    /// Per hole, a point from which its loop can be seen.
+    pub hole_centres: Vec<GridPoint>,
+    /// What was done.
+    pub report: Report,
+}
+
+/// Steps and accuracy of one attempt.
+#[derive(Clone, Copy, Debug, Default)]
+struct Effort {
+    iterations: usize,
+    decrement: f64,
+}
+
+impl Effort {
+    fn add(&mut self, outcome: newton::Outcome) {
+        self.iterations += outcome.iterations;
+        self.decrement = outcome.decrement;
+    }
+
+    fn merge(&mut self, other: Self) {
+        self.iterations += other.iterations;
+        self.decrement = self.decrement.max(other.decrement);
+    }
+}
+
+/// Untangles the harmonic map of `chart`; `start` is the valid raised linear map with the same boundary.
+pub fn untangle(chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap) -> Untangled {
+    let mut effort = Effort::default();
+    let (method, nodes, hole_centres) = best(chart, start, harmonic, &mut effort);
+    let moved = |n: &usize| nodes[*n] != harmonic.nodes()[*n];
+    let report = Report {
+        method,
+        iterations: effort.iterations,
+        nodes_moved: (0..chart.own_nodes()).filter(moved).count(),
+        energy_harmonic: harmonic.energy(),
+        energy_start: energy(chart, start),
+        energy: energy(chart, &nodes),
+        gradient_norm: effort.decrement.max(0.0).sqrt(),
+    };
+    Untangled { nodes, hole_centres, report }
+}
+
+/// The first of the paths that leads to a valid map.
+fn best(
+    chart: &ClosedChart,
+    start: &[GridPoint],
+    harmonic: &QuadraticMap,
+    effort: &mut Effort,
+) -> (Method, Vec<GridPoint>, Vec<GridPoint>) {
+    if let Some(centres) = valid(chart, harmonic.nodes()) {
+        return (Method::Harmonic, harmonic.nodes().to_vec(), centres);
+    }
+    if harmonic.invalid().len() as f64 <= FEW * chart.own_triangles() as f64 {
+        let nodes = patch::untangle(chart, start, harmonic, effort);
+        if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
+            return (Method::Patch, nodes.unwrap_or_default(), centres);
+        }
+    }
+    effort.decrement = 0.0;
+    let nodes = feasible::untangle(chart, start, effort);
+    if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
+        return (Method::Feasible, nodes.unwrap_or_default(), centres);
+    }
+    let centres = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
+    (Method::Start, start.to_vec(), centres)
+}
+
+/// If the map is valid and every hole can be seen from a point, these points.
+fn valid(chart: &ClosedChart, nodes: &[GridPoint]) -> Option<Vec<GridPoint>> {
+    let centres: Option<Vec<_>> = (0..chart.loops().len()).map(|k| centre_of_hole(chart, nodes, k)).collect();
+    centres.filter(|_| invalid_triangles(chart, nodes).is_empty())
+}
+
+/// A point from which all of the loop around hole `k` can be seen.
+fn centre_of_hole(chart: &ClosedChart, nodes: &[GridPoint], k: usize) -> Option<GridPoint> {
+    let arcs: Vec<Arc> = chart.loops()[k].iter().map(|h| arc(chart, nodes, *h)).collect();
+    star_centre(&arcs, nodes[chart.centre_node(k)])
+}
+
+fn arc(chart: &ClosedChart, nodes: &[GridPoint], h: crate::id::HalfEdgeId) -> Arc {
+    let [from, to] = chart.ends(h).map(|v| nodes[chart.vertex_node(v)]);
+    Arc { from, mid: nodes[chart.mid_node(h)], to }
+}
+
+/// Places of all nodes as doubles, followed by the star centres.
+fn places(nodes: &[GridPoint], centres: &[GridPoint]) -> Places {
+    nodes.iter().chain(centres).map(|p| p.uv()).collect()
+}
+
+/// The nodes of `x` on the grid.
+fn on_grid(chart: &ClosedChart, x: &Places) -> Vec<GridPoint> {
+    quadratic::to_grid(chart, &x[..chart.node_count()])
+}
+
+#[cfg(test)]
+mod tests;

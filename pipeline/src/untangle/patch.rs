@@ -1,0 +1,176 @@
+//! The patch path: only a few rings around invalid triangles move.
+
+use super::newton::minimise;
+use super::penalty::{Bound, Penalty};
+use super::problem::{Cell, Places, Problem};
+use super::region::{self, Stars};
+use super::{Effort, arc, centre_of_hole, on_grid, places};
+use crate::bernstein::Validity;
+use crate::closed::ClosedChart;
+use crate::grid::GridPoint;
+use crate::id::HalfEdgeId;
+use crate::quadratic::{QuadraticMap, det, invalid_triangles};
+use crate::sparse::Error;
+
+/// Rings around invalid triangles, one attempt after another.
+const RINGS: [usize; 5] = [2, 4, 7, 12, 20];
+
+/// Patches with more triangles than this share of the chart are left to the feasible path.
+const LARGEST: f64 = 0.5;
+
+/// Weight of the regularised penalty, relative to the area of each triangle in the plane.
+const PULL: f64 = 3e-2;
+
+/// Changes of the regularised penalty's width, and Newton steps for each.
+const ROUNDS: usize = 25;
+const STEPS_PER_ROUND: usize = 4;
+
+/// The weights of the barrier that follows, and Newton steps for each.
+const WEIGHTS: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+const STEPS_PER_WEIGHT: usize = 10;
+
+/// A weight is left when the promised decrease falls below this share of the patch's energy.
+const TOLERANCE: f64 = 1e-10;
+
+/// Untangles patch by patch; `None` where some patch does not yield.
+pub(super) fn untangle(
+    chart: &ClosedChart,
+    start: &[GridPoint],
+    harmonic: &QuadraticMap,
+    effort: &mut Effort,
+) -> Option<Vec<GridPoint>> {
+    let setting = Setting::new(chart, start);
+    let mut nodes = harmonic.nodes().to_vec();
+    for rings in RINGS {
+        let centres: Vec<_> = (0..chart.loops().len()).map(|k| centre_of_hole(chart, &nodes, k)).collect();
+        let seeds = seeds(chart, &nodes, &centres);
+        if seeds.is_empty() {
+            return Some(nodes);
+        }
+        let fallback = |k: usize| centres[k].unwrap_or(nodes[chart.centre_node(k)]);
+        let centres: Vec<GridPoint> = (0..centres.len()).map(fallback).collect();
+        let patches = region::patches(chart, &setting.stars, &seeds, rings);
+        if patches.iter().any(|p| p.len() as f64 > LARGEST * chart.own_triangles() as f64) {
+            return None;
+        }
+        for faces in patches {
+            setting.solve(faces, &mut nodes, &centres, effort);
+        }
+    }
+    seeds(chart, &nodes, &vec![Some(GridPoint::default()); chart.loops().len()]).is_empty().then_some(nodes)
+}
+
+/// The triangles that must change: invalid ones, and those at arcs of holes that no point can see.
+fn seeds(chart: &ClosedChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]) -> Vec<u32> {
+    let mut seeds: Vec<u32> = invalid_triangles(chart, nodes).iter().map(|f| f.0).collect();
+    for (k, hole) in chart.loops().iter().enumerate().filter(|(k, _)| centres[*k].is_none()) {
+        let hidden =
+            |h: &&HalfEdgeId| arc(chart, nodes, **h).products(nodes[chart.centre_node(k)]).iter().any(|p| *p >= 0);
+        seeds.extend(hole.iter().filter(hidden).map(|h| h.face().0));
+    }
+    seeds.sort_unstable();
+    seeds.dedup();
+    seeds
+}
+
+/// What all patches of a chart share.
+struct Setting<'a> {
+    chart: &'a ClosedChart,
+    stars: Stars,
+    /// Per triangle, a typical jacobian: its area in space times the area scale of the linear map around it.
+    density: Vec<f64>,
+    /// The raised linear map.
+    start: Places,
+}
+
+impl<'a> Setting<'a> {
+    fn new(chart: &'a ClosedChart, start: &[GridPoint]) -> Self {
+        let stars = Stars::new(chart);
+        let in_plane = |f: usize| det(chart, start, f).coefficients().iter().sum::<f64>() / 6.0;
+        let plane: Vec<f64> = (0..chart.triangles().len()).map(in_plane).collect();
+        let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
+        let density = |f: usize| {
+            let around = || chart.triangles()[f].iter().flat_map(|v| stars.around(v.index())).map(|g| *g as usize);
+            let scale = around().map(|g| plane[g]).sum::<f64>() / around().map(|g| space[g]).sum::<f64>();
+            scale * space[f]
+        };
+        let density = (0..plane.len()).map(density).collect();
+        let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
+        Self { chart, stars, density, start: places(start, &centres) }
+    }
+
+    /// Untangles one patch; leaves `nodes` as they are where that fails.
+    fn solve(&self, faces: Vec<u32>, nodes: &mut [GridPoint], centres: &[GridPoint], effort: &mut Effort) {
+        let mut x = places(nodes, centres);
+        let mut problem = self.problem(&faces);
+        if problem.unknowns() == 0 {
+            return;
+        }
+        let mut spent = Effort::default();
+        let solved = relax(&mut problem, &mut x, &mut spent);
+        effort.iterations += spent.iterations;
+        if solved.is_err() {
+            return;
+        }
+        let moved = on_grid(self.chart, &x);
+        let own = faces.iter().filter(|f| (**f as usize) < self.chart.own_triangles());
+        if own.into_iter().all(|f| det(self.chart, &moved, *f as usize).validity() != Validity::Invalid) {
+            effort.merge(Effort { iterations: 0, ..spent });
+            nodes.copy_from_slice(&moved);
+        }
+    }
+
+    /// The problem on a patch: penalties on its triangles and on the arcs of holes in it.
+    fn problem(&self, faces: &[u32]) -> Problem<'a> {
+        let own = |f: u32| (f as usize) < self.chart.own_triangles();
+        let bound = |f: u32| {
+            let density = self.density[f as usize];
+            Bound { scale: density, floor: 0.0, weight: 0.5 * density }
+        };
+        let cells = faces.iter().map(|f| Cell { face: *f, bounds: own(*f).then(|| [bound(*f); 6]) }).collect();
+        let mean = faces.iter().map(|f| 0.5 * self.density[*f as usize]).sum::<f64>() / faces.len() as f64;
+        let unset = Bound { scale: 1.0, floor: 0.0, weight: mean };
+        let arcs = region::arc_cells(self.chart, |h| faces.binary_search(&h.face().0).is_ok(), unset);
+        let free = region::free_nodes(self.chart, &self.stars, faces);
+        let mut problem = Problem::new(self.chart, cells, arcs, free);
+        let scales: Vec<[f64; 3]> = problem
+            .arcs
+            .iter()
+            .map(|a| a.nodes.map(|n| self.start[n as usize]))
+            .map(|x| super::terms::arc_products(&x))
+            .collect();
+        for (arc, scale) in problem.arcs.iter_mut().zip(scales) {
+            (0..3).for_each(|k| arc.bounds[k].scale = scale[k]);
+        }
+        problem
+    }
+}
+
+/// Pulls a patch over to the valid side, then lets it relax towards the harmonic map. The error `Singular` also
+/// stands for a patch that does not yield.
+fn relax(problem: &mut Problem, x: &mut Places, effort: &mut Effort) -> Result<(), Error> {
+    let pattern = problem.pattern();
+    let analysis = pattern.analyse()?;
+    problem.scale_weights(PULL);
+    let mut least = problem.least(x);
+    for _ in 0..ROUNDS {
+        if least > 0.0 {
+            break;
+        }
+        let penalty = Penalty::Regularised { eps: (-0.2 * least).max(1e-3) };
+        effort.add(minimise(problem, (&pattern, &analysis), x, penalty, (STEPS_PER_ROUND, TOLERANCE))?);
+        least = problem.least(x);
+    }
+    if least <= 0.0 {
+        return Err(Error::Singular { unknowns: problem.unknowns() });
+    }
+    // A barrier that the point clears: a thousandth of the typical size, or half of what is there.
+    problem.for_each_bound(x, |c, bound| bound.floor = (1e-3 * bound.scale).min(0.5 * c));
+    let mut last = PULL;
+    for weight in WEIGHTS {
+        problem.scale_weights(weight / last);
+        last = weight;
+        effort.add(minimise(problem, (&pattern, &analysis), x, Penalty::Barrier, (STEPS_PER_WEIGHT, TOLERANCE))?);
+    }
+    Ok(())
+}

@@ -1,0 +1,83 @@
+//! Scalar penalties that keep a quantity positive: value, slope and curvature.
+
+/// A convex, falling function of one coefficient.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Penalty {
+    /// -weight ln((c - floor) / scale): infinite at the floor. For points that are valid.
+    Barrier,
+    /// weight / chi(d), d = (c - floor) / scale, chi(d) = (d + sqrt(d^2 + eps^2)) / 2: finite everywhere, steep
+    /// where d is negative (Garanzha and co-workers 2021, doi 10.1145/3450626.3459847). For points that are not.
+    Regularised {
+        /// Width of the transition, > 0.
+        eps: f64,
+    },
+}
+
+/// A penalty at one point: its value, minus its slope (>= 0), and its curvature (>= 0).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Value {
+    pub value: f64,
+    pub push: f64,
+    pub bend: f64,
+}
+
+/// The numbers that belong to one constrained coefficient.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bound {
+    /// A typical size of the coefficient, > 0.
+    pub scale: f64,
+    /// What it must stay above.
+    pub floor: f64,
+    /// How much the penalty counts.
+    pub weight: f64,
+}
+
+impl Penalty {
+    /// The penalty of the coefficient `c`; a value of infinity outside the barrier.
+    pub fn at(self, c: f64, bound: &Bound) -> Value {
+        let gap = c - bound.floor;
+        let w = bound.weight;
+        match self {
+            Self::Barrier if gap > 0.0 => {
+                Value { value: -w * (gap / bound.scale).ln(), push: w / gap, bend: w / (gap * gap) }
+            }
+            Self::Barrier => Value { value: f64::INFINITY, push: 0.0, bend: 0.0 },
+            Self::Regularised { eps } => {
+                let d = gap / bound.scale;
+                let root = d.hypot(eps);
+                // 1 / chi without cancellation on either side of zero.
+                let inverse = if d > 0.0 { 2.0 / (d + root) } else { 2.0 * (root - d) / (eps * eps) };
+                let slope = inverse / root / bound.scale;
+                let bend = 2.0 / (root * root * root) / (bound.scale * bound.scale);
+                Value { value: w * inverse, push: w * slope, bend: w * bend }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_and_curvatures_are_derivatives() {
+        let bound = Bound { scale: 0.7, floor: 0.01, weight: 1.3 };
+        let h = 1e-5;
+        for penalty in [Penalty::Barrier, Penalty::Regularised { eps: 0.1 }] {
+            for c in [0.05, 0.4, 2.0] {
+                let [low, mid, high] = [c - h, c, c + h].map(|c| penalty.at(c, &bound));
+                assert!(((high.value - low.value) / (2.0 * h) + mid.push).abs() < 1e-5 * mid.push);
+                assert!(((low.push - high.push) / (2.0 * h) - mid.bend).abs() < 1e-5 * mid.bend);
+            }
+        }
+    }
+
+    #[test]
+    fn the_regularised_penalty_is_smooth_and_falling_through_zero() {
+        let bound = Bound { scale: 1.0, floor: 0.0, weight: 1.0 };
+        let penalty = Penalty::Regularised { eps: 1e-3 };
+        let values: Vec<_> = (-50..50).map(|i| penalty.at(f64::from(i) * 1e-4, &bound)).collect();
+        assert!(values.windows(2).all(|w| w[0].value > w[1].value && w[0].push > w[1].push));
+        assert_eq!(Penalty::Barrier.at(0.0, &bound).value, f64::INFINITY);
+    }
+}

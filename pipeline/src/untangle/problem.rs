@@ -1,0 +1,246 @@
+//! The optimisation problem on a region of a chart: Dirichlet energy plus penalties, over the nodes that may move.
+
+use super::penalty::{Bound, Penalty, Value};
+use super::terms::{self, Corners, Form, Four, Six};
+use crate::closed::ClosedChart;
+use crate::element;
+use crate::sparse::{Error, PRESCRIBED, Pattern};
+
+/// The places of all nodes of a closed chart, followed by the star centre of each hole.
+pub(super) type Places = Vec<[f64; 2]>;
+
+/// A triangle of the region, with penalties on its six coefficients (none on virtual fans).
+pub(super) struct Cell {
+    pub face: u32,
+    pub bounds: Option<[Bound; 6]>,
+}
+
+/// An arc of a hole's loop with its star centre, with penalties on its three products.
+pub(super) struct ArcCell {
+    pub nodes: [u32; 4],
+    pub bounds: [Bound; 3],
+}
+
+/// The part of a chart in which nodes may move, and the penalties that hold there.
+pub(super) struct Problem<'a> {
+    pub chart: &'a ClosedChart,
+    pub cells: Vec<Cell>,
+    pub arcs: Vec<ArcCell>,
+    /// The nodes that may move.
+    pub free: Vec<u32>,
+    /// Per node, its place among `free`, or [`PRESCRIBED`].
+    number: Vec<u32>,
+}
+
+/// Slope and curvature of the objective at a point.
+pub(super) struct Model {
+    pub gradient: Vec<f64>,
+    pub hessian: Vec<f64>,
+}
+
+impl<'a> Problem<'a> {
+    pub fn new(chart: &'a ClosedChart, cells: Vec<Cell>, arcs: Vec<ArcCell>, free: Vec<u32>) -> Self {
+        let mut number = vec![PRESCRIBED; chart.node_count() + chart.loops().len()];
+        free.iter().enumerate().for_each(|(i, n)| number[*n as usize] = i as u32);
+        Self { chart, cells, arcs, free, number }
+    }
+
+    /// The number of scalar unknowns: two per free node.
+    pub fn unknowns(&self) -> usize {
+        2 * self.free.len()
+    }
+
+    fn nodes(&self, cell: &Cell) -> [usize; 6] {
+        self.chart.nodes(cell.face as usize)
+    }
+
+    /// The pattern of the Hessian: first the triangles, then the arcs (padded to the same size).
+    pub fn pattern(&self) -> Pattern {
+        let pair = |n: usize| match self.number[n] {
+            PRESCRIBED => [PRESCRIBED; 2],
+            i => [2 * i, 2 * i + 1],
+        };
+        let mut elements: Vec<[u32; 12]> = Vec::with_capacity(self.cells.len() + self.arcs.len());
+        for cell in &self.cells {
+            let nodes = self.nodes(cell);
+            elements.push(std::array::from_fn(|i| pair(nodes[i / 2])[i % 2]));
+        }
+        for arc in &self.arcs {
+            elements
+                .push(std::array::from_fn(|i| arc.nodes.get(i / 2).map_or(PRESCRIBED, |n| pair(*n as usize)[i % 2])));
+        }
+        Pattern::new(self.unknowns(), &elements)
+    }
+
+    /// The energy of the region plus all penalties.
+    pub fn objective(&self, x: &Places, penalty: Penalty) -> f64 {
+        let mut total = 0.0;
+        for cell in &self.cells {
+            let six = self.six(cell, x);
+            total += element::energy(&element::stiffness(&self.chart.shapes()[cell.face as usize]), &six);
+            if let Some(bounds) = &cell.bounds {
+                let dets = Corners::new(&six).dets();
+                total += (0..6).map(|k| penalty.at(dets[k], &bounds[k]).value).sum::<f64>();
+            }
+        }
+        for arc in &self.arcs {
+            let products = terms::arc_products(&four(arc, x));
+            total += (0..3).map(|k| penalty.at(products[k], &arc.bounds[k]).value).sum::<f64>();
+        }
+        total
+    }
+
+    fn six(&self, cell: &Cell, x: &Places) -> Six {
+        self.nodes(cell).map(|n| x[n])
+    }
+
+    /// Gradient and (positive) Hessian at `x`.
+    pub fn model(&self, x: &Places, penalty: Penalty, pattern: &Pattern) -> Model {
+        let mut model = Model { gradient: vec![0.0; self.unknowns()], hessian: pattern.zeros() };
+        for (i, cell) in self.cells.iter().enumerate() {
+            let six = self.six(cell, x);
+            let shape = &self.chart.shapes()[cell.face as usize];
+            let stiffness = element::stiffness(shape);
+            let mut gradient = energy_gradient(&stiffness, &six);
+            let mut form = Form::of_stiffness(stiffness);
+            let mut outer = Vec::with_capacity(6);
+            if let Some(bounds) = &cell.bounds {
+                let corners = Corners::new(&six);
+                let dets = corners.dets();
+                let values: [Value; 6] = std::array::from_fn(|k| penalty.at(dets[k], &bounds[k]));
+                form.add_curvature(shape, &values.map(|v| v.push));
+                outer.extend((0..6).map(|k| (values[k], corners.gradient(k))));
+            }
+            let mut hessian = form.matrix();
+            add_outer(&mut gradient, &mut hessian, &outer);
+            pattern.add(&mut model.hessian, i, &hessian);
+            self.scatter(&mut model.gradient, &self.nodes(cell), &gradient);
+        }
+        for (i, arc) in self.arcs.iter().enumerate() {
+            let places = four(arc, x);
+            let products = terms::arc_products(&places);
+            let (mut gradient, mut hessian) = ([0.0; 12], [[0.0; 12]; 12]);
+            let outer: Vec<_> = (0..3)
+                .map(|k| (penalty.at(products[k], &arc.bounds[k]), padded(terms::arc_gradient(&places, k))))
+                .collect();
+            add_outer(&mut gradient, &mut hessian, &outer);
+            pattern.add(&mut model.hessian, self.cells.len() + i, &hessian);
+            self.scatter(&mut model.gradient, &arc.nodes.map(|n| n as usize), &gradient);
+        }
+        model
+    }
+
+    fn scatter(&self, gradient: &mut [f64], nodes: &[usize], element: &[f64; 12]) {
+        for (i, n) in nodes.iter().enumerate() {
+            let number = self.number[*n];
+            if number != PRESCRIBED {
+                gradient[2 * number as usize] += element[2 * i];
+                gradient[2 * number as usize + 1] += element[2 * i + 1];
+            }
+        }
+    }
+
+    /// The direction that belongs to a step of the unknowns: zero at nodes that may not move.
+    pub fn direction(&self, step: &[f64]) -> Places {
+        let mut direction = vec![[0.0; 2]; self.number.len()];
+        for (i, n) in self.free.iter().enumerate() {
+            direction[*n as usize] = [step[2 * i], step[2 * i + 1]];
+        }
+        direction
+    }
+
+    /// The largest t at which no penalised quantity of `x + t direction` has fallen to its floor yet.
+    pub fn longest_step(&self, x: &Places, direction: &Places) -> f64 {
+        let mut longest = f64::INFINITY;
+        let mut meet = |c0: f64, c1: f64, c2: f64| longest = longest.min(terms::first_zero(c0, c1, c2));
+        for cell in &self.cells {
+            let Some(bounds) = &cell.bounds else { continue };
+            let (at, along) = (Corners::new(&self.six(cell, x)), Corners::new(&self.six(cell, direction)));
+            let (c0, c1, c2) = (at.dets(), at.mixed(&along), along.dets());
+            (0..6).for_each(|k| meet(c0[k] - bounds[k].floor, c1[k], c2[k]));
+        }
+        for arc in &self.arcs {
+            let (at, along) = (four(arc, x), four(arc, direction));
+            let (c0, c1, c2) = (terms::arc_products(&at), terms::arc_mixed(&at, &along), terms::arc_products(&along));
+            (0..3).for_each(|k| meet(c0[k] - arc.bounds[k].floor, c1[k], c2[k]));
+        }
+        longest
+    }
+
+    /// Calls `visit` with every penalised quantity and its bound.
+    pub fn for_each_bound(&mut self, x: &Places, mut visit: impl FnMut(f64, &mut Bound)) {
+        for i in 0..self.cells.len() {
+            let dets = Corners::new(&self.six(&self.cells[i], x)).dets();
+            if let Some(bounds) = &mut self.cells[i].bounds {
+                (0..6).for_each(|k| visit(dets[k], &mut bounds[k]));
+            }
+        }
+        for arc in &mut self.arcs {
+            let products = terms::arc_products(&four(arc, x));
+            (0..3).for_each(|k| visit(products[k], &mut arc.bounds[k]));
+        }
+    }
+
+    /// The least penalised quantity, relative to its scale.
+    pub fn least(&mut self, x: &Places) -> f64 {
+        let mut least = f64::INFINITY;
+        self.for_each_bound(x, |c, bound| least = least.min((c - bound.floor) / bound.scale));
+        least
+    }
+
+    /// Scales the weights of all penalties.
+    pub fn scale_weights(&mut self, factor: f64) {
+        let bounds = self.cells.iter_mut().filter_map(|c| c.bounds.as_mut()).flatten();
+        bounds.chain(self.arcs.iter_mut().flat_map(|a| &mut a.bounds)).for_each(|b| b.weight *= factor);
+    }
+}
+
+fn four(arc: &ArcCell, x: &Places) -> Four {
+    arc.nodes.map(|n| x[n as usize])
+}
+
+fn padded(g: [f64; 8]) -> [f64; 12] {
+    std::array::from_fn(|i| if i < 8 { g[i] } else { 0.0 })
+}
+
+/// The gradient of the Dirichlet energy of a triangle.
+fn energy_gradient(stiffness: &[[f64; 6]; 6], x: &Six) -> [f64; 12] {
+    let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
+    std::array::from_fn(|i| (0..6).map(|n| stiffness[i / 2][n] * d[n][i % 2]).sum())
+}
+
+/// Adds slopes and curvatures of penalties with these gradients.
+fn add_outer(gradient: &mut [f64; 12], hessian: &mut [[f64; 12]; 12], terms: &[(Value, [f64; 12])]) {
+    for (value, g) in terms {
+        for i in 0..12 {
+            gradient[i] -= value.push * g[i];
+            for j in 0..=i {
+                hessian[i][j] += value.bend * g[i] * g[j];
+            }
+        }
+    }
+}
+
+/// Newton's step: minus the inverse Hessian times the gradient. Where rounding makes the Hessian singular its
+/// diagonal is raised, a hundredfold at a time.
+pub(super) fn newton_step(
+    pattern: &Pattern,
+    analysis: &crate::sparse::Analysis,
+    model: &mut Model,
+) -> Result<Vec<f64>, Error> {
+    let mut shift = 1e-12;
+    loop {
+        match analysis.factorise(&model.hessian) {
+            Ok(factor) => {
+                let mut step: Vec<f64> = model.gradient.iter().map(|g| -g).collect();
+                factor.solve(&mut step, 1);
+                return Ok(step);
+            }
+            Err(Error::Singular { .. }) if shift < 1e-2 => {
+                pattern.diagonal().for_each(|d| model.hessian[d] *= 1.0 + shift);
+                shift *= 100.0;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Regions of a chart: rings around triangles, and what may move inside.
+
+use super::penalty::Bound;
+use super::problem::{ArcCell, Places};
+use crate::closed::ClosedChart;
+use crate::element;
+use crate::id::HalfEdgeId;
+use crate::union_find::UnionFind;
+
+/// Per vertex of the closed chart, the triangles around it.
+pub(super) struct Stars {
+    starts: Vec<u32>,
+    faces: Vec<u32>,
+}
+
+impl Stars {
+    pub fn new(chart: &ClosedChart) -> Self {
+        let mut starts = vec![0_u32; chart.vertex_count() + 1];
+        chart.triangles().iter().flatten().for_each(|v| starts[v.index() + 1] += 1);
+        (0..chart.vertex_count()).for_each(|v| starts[v + 1] += starts[v]);
+        let mut next = starts.clone();
+        let mut faces = vec![0; starts[chart.vertex_count()] as usize];
+        for (f, t) in chart.triangles().iter().enumerate() {
+            for v in t {
+                faces[next[v.index()] as usize] = f as u32;
+                next[v.index()] += 1;
+            }
+        }
+        Self { starts, faces }
+    }
+
+    pub fn around(&self, vertex: usize) -> &[u32] {
+        &self.faces[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+    }
+}
+
+/// The triangles within `rings` rings of the seeds, ascending, grouped into parts that share no vertex. Rings
+/// grow through vertices of the chart, not through the centres of fans.
+pub(super) fn patches(chart: &ClosedChart, stars: &Stars, seeds: &[u32], rings: usize) -> Vec<Vec<u32>> {
+    let mut inside = vec![false; chart.triangles().len()];
+    let mut reached = vec![false; chart.own_vertices()];
+    let mut front: Vec<u32> = seeds.to_vec();
+    seeds.iter().for_each(|f| inside[*f as usize] = true);
+    let mut all = front.clone();
+    let own = chart.own_vertices();
+    for _ in 0..rings {
+        let mut next = Vec::new();
+        let vertices = front.iter().flat_map(|f| chart.triangles()[*f as usize]).filter(|v| v.index() < own);
+        for v in vertices {
+            if !std::mem::replace(&mut reached[v.index()], true) {
+                let new =
+                    stars.around(v.index()).iter().filter(|f| !std::mem::replace(&mut inside[**f as usize], true));
+                next.extend(new.copied());
+            }
+        }
+        all.extend(&next);
+        front = next;
+    }
+    all.sort_unstable();
+    all.dedup();
+    components(chart, all)
+}
+
+fn components(chart: &ClosedChart, faces: Vec<u32>) -> Vec<Vec<u32>> {
+    let mut sets = UnionFind::new(chart.vertex_count());
+    for f in &faces {
+        let [a, b, c] = chart.triangles()[*f as usize].map(|v| v.index());
+        sets.unite(a, b);
+        sets.unite(b, c);
+    }
+    let mut keyed: Vec<(usize, u32)> =
+        faces.iter().map(|f| (sets.find(chart.triangles()[*f as usize][0].index()), *f)).collect();
+    keyed.sort_unstable();
+    keyed.chunk_by(|a, b| a.0 == b.0).map(|part| part.iter().map(|k| k.1).collect()).collect()
+}
+
+/// The nodes that may move when only `faces` (ascending) may change: all of their triangles are among them, and
+/// they are not on the outer loop.
+pub(super) fn free_nodes(chart: &ClosedChart, stars: &Stars, faces: &[u32]) -> Vec<u32> {
+    let among = |f: u32| faces.binary_search(&f).is_ok();
+    let mut free = Vec::new();
+    for &f in faces {
+        let nodes = chart.nodes(f as usize);
+        for (k, v) in chart.triangles()[f as usize].iter().enumerate() {
+            let h = HalfEdgeId::at(3 * f as usize + k);
+            let sides = chart.edges().sides(chart.edges().edge(h));
+            if sides.len() == 2 && sides.iter().all(|s| among(s.face().0)) {
+                free.push(nodes[3 + k] as u32);
+            }
+            if stars.around(v.index()).iter().all(|g| among(*g)) {
+                free.push(nodes[k] as u32);
+            }
+        }
+    }
+    free.sort_unstable();
+    free.dedup();
+    // Vertices of the outer loop are fixed whatever lies around them.
+    let outer: Vec<u32> = {
+        let mut all: Vec<u32> = chart.outer().iter().map(|h| chart.vertex_node(chart.ends(*h)[0]) as u32).collect();
+        all.sort_unstable();
+        all
+    };
+    free.retain(|n| outer.binary_search(n).is_err());
+    free
+}
+
+/// The arcs of all holes whose half-edges `wanted` picks, with their star centres, all with the bound `unset`.
+pub(super) fn arc_cells(chart: &ClosedChart, wanted: impl Fn(HalfEdgeId) -> bool, unset: Bound) -> Vec<ArcCell> {
+    let cell = |k: usize, h: HalfEdgeId| {
+        let [from, to] = chart.ends(h).map(|v| chart.vertex_node(v) as u32);
+        let centre = (chart.node_count() + k) as u32;
+        ArcCell { nodes: [from, chart.mid_node(h) as u32, to, centre], bounds: [unset; 3] }
+    };
+    let holes = chart.loops().iter().enumerate();
+    holes
+        .flat_map(|(k, l)| l.iter().map(move |h| (k, *h)))
+        .filter(|(_, h)| wanted(*h))
+        .map(|(k, h)| cell(k, h))
+        .collect()
+}
+
+/// The Dirichlet energy of every triangle.
+pub(super) fn energies(chart: &ClosedChart, x: &Places) -> Vec<f64> {
+    let one = |f: usize| element::energy(&element::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| x[n]));
+    (0..chart.triangles().len()).map(one).collect()
+}

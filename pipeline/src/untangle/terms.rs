@@ -1,0 +1,270 @@
+//! The constrained quantities, their gradients, and the part of their curvature that is kept.
+
+use crate::element;
+use crate::mesh::TriangleShape;
+use std::sync::LazyLock;
+
+/// Values at six nodes.
+pub(super) type Six = [[f64; 2]; 6];
+
+/// The derivatives of the basis along xi and eta at the three corners.
+static AT_CORNERS: LazyLock<[[[f64; 2]; 6]; 3]> =
+    LazyLock::new(|| [0, 1, 2].map(|k| element::gradients(element::NODES[k])));
+
+/// The pairs of corners behind the six Bernstein coefficients M_00, M_11, M_22, M_01, M_12, M_20.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// The derivatives of a map at the three corners: along xi (a) and eta (b).
+pub(super) struct Corners {
+    a: [[f64; 2]; 3],
+    b: [[f64; 2]; 3],
+}
+
+impl Corners {
+    /// Of nodal values `x`, taken relative to the first so that small triangles lose no digits.
+    pub fn new(x: &Six) -> Self {
+        let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
+        let along = |k: usize, dir: usize| {
+            let terms = |c: usize| (1..6).map(|n| AT_CORNERS[k][n][dir] * d[n][c]).sum::<f64>();
+            [terms(0), terms(1)]
+        };
+        Self { a: [0, 1, 2].map(|k| along(k, 0)), b: [0, 1, 2].map(|k| along(k, 1)) }
+    }
+
+    /// The six Bernstein coefficients of the jacobian determinant.
+    pub fn dets(&self) -> [f64; 6] {
+        PAIRS.map(|(i, j)| 0.5 * (cross(self.a[i], self.b[j]) + cross(self.a[j], self.b[i])))
+    }
+
+    /// What is linear in t in the coefficients of `self + t other`.
+    pub fn mixed(&self, other: &Self) -> [f64; 6] {
+        let one = |p: &Self, q: &Self, i: usize, j: usize| cross(p.a[i], q.b[j]);
+        PAIRS.map(|(i, j)| {
+            0.5 * (one(self, other, i, j) + one(other, self, i, j) + one(self, other, j, i) + one(other, self, j, i))
+        })
+    }
+
+    /// The gradient of coefficient `k` with respect to the twelve nodal values (u0, v0, u1, ...).
+    pub fn gradient(&self, k: usize) -> [f64; 12] {
+        let (i, j) = PAIRS[k];
+        let mut g = [0.0; 12];
+        for n in 0..6 {
+            for (p, q) in [(i, j), (j, i)] {
+                let (ga, gb) = (0.5 * AT_CORNERS[p][n][0], 0.5 * AT_CORNERS[q][n][1]);
+                g[2 * n] += ga * self.b[q][1] - gb * self.a[p][1];
+                g[2 * n + 1] += gb * self.a[p][0] - ga * self.b[q][0];
+            }
+        }
+        g
+    }
+}
+
+/// A Hermitian form in the six complex nodal values u + i v: real and imaginary parts.
+pub(super) struct Form {
+    re: [[f64; 6]; 6],
+    im: [[f64; 6]; 6],
+}
+
+impl Form {
+    /// The Dirichlet energy's.
+    pub fn of_stiffness(stiffness: [[f64; 6]; 6]) -> Self {
+        Self { re: stiffness, im: [[0.0; 6]; 6] }
+    }
+
+    /// Adds `weight` |sum over n of (r_n + i s_n) w_n|^2.
+    fn add_square(&mut self, weight: f64, r: &[f64; 6], s: &[f64; 6]) {
+        for m in 0..6 {
+            for n in 0..6 {
+                self.re[m][n] += weight * (r[m] * r[n] + s[m] * s[n]);
+                self.im[m][n] += weight * (r[m] * s[n] - s[m] * r[n]);
+            }
+        }
+    }
+
+    /// Adds the curvature of penalties with the slopes `-push` in the six coefficients.
+    ///
+    /// In an orthonormal frame of the triangle in space, each coefficient is a difference of squares: with the
+    /// complex derivatives P (along z) and N (along the conjugate of z) at the corners, M_ii = |P_i|^2 - |N_i|^2
+    /// and M_ij = Re(P_i conj P_j) - Re(N_i conj N_j). A falling penalty curves upwards along the negative
+    /// squares and downwards along the positive ones; the former are kept, exactly, the latter dropped. So the
+    /// matrix stays positive, whatever the rounding, and no eigenvalues are needed.
+    pub fn add_curvature(&mut self, shape: &TriangleShape, push: &[f64; 6]) {
+        let (p, n) = complex_derivatives(shape);
+        for (k, (i, j)) in PAIRS.into_iter().enumerate() {
+            if i == j {
+                self.add_square(2.0 * push[k], &n[i].0, &n[i].1);
+                continue;
+            }
+            let combine = |a: &[f64; 6], b: &[f64; 6], sign: f64| std::array::from_fn(|m| a[m] + sign * b[m]);
+            self.add_square(0.5 * push[k], &combine(&p[i].0, &p[j].0, -1.0), &combine(&p[i].1, &p[j].1, -1.0));
+            self.add_square(0.5 * push[k], &combine(&n[i].0, &n[j].0, 1.0), &combine(&n[i].1, &n[j].1, 1.0));
+        }
+    }
+
+    /// The real symmetric matrix over (u0, v0, u1, ...).
+    pub fn matrix(&self) -> [[f64; 12]; 12] {
+        let mut h = [[0.0; 12]; 12];
+        for m in 0..6 {
+            for n in 0..6 {
+                h[2 * m][2 * n] = self.re[m][n];
+                h[2 * m + 1][2 * n + 1] = self.re[m][n];
+                h[2 * m][2 * n + 1] = -self.im[m][n];
+                h[2 * m + 1][2 * n] = self.im[m][n];
+            }
+        }
+        h
+    }
+}
+
+/// Real and imaginary parts of the coefficients of a complex-linear form in the nodal values.
+type Coefficients = ([f64; 6], [f64; 6]);
+
+/// The complex derivatives (df/dz and df/d conj z) at the corners, times sqrt(2 area).
+fn complex_derivatives(shape: &TriangleShape) -> ([Coefficients; 3], [Coefficients; 3]) {
+    let p = shape.in_plane();
+    let (length, x, y) = (p[1][0], p[2][0], p[2][1]);
+    let half = 0.5 * (length * y).sqrt();
+    let at = |k: usize| -> [[f64; 2]; 6] {
+        AT_CORNERS[k].map(|[xi, eta]| {
+            let first = xi / length;
+            [half * first, half * (eta - x * first) / y]
+        })
+    };
+    let split = |k: usize, sign: f64| {
+        let g = at(k);
+        (g.map(|g| g[0]), g.map(|g| sign * g[1]))
+    };
+    ([0, 1, 2].map(|k| split(k, -1.0)), [0, 1, 2].map(|k| split(k, 1.0)))
+}
+
+/// The three products of an arc of a hole's loop about a centre, with the sign that makes them positive on a
+/// star-shaped loop: nodes are first end, middle, second end, centre.
+pub(super) type Four = [[f64; 2]; 4];
+
+/// The pairs of (p0, c, p1) behind the three products.
+const ARC_PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
+
+/// p0, c and p1 relative to the centre, as combinations of the four nodes.
+const ARC_POINTS: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, -1.0], [-0.5, 2.0, -0.5, -1.0], [0.0, 0.0, 1.0, -1.0]];
+
+fn arc_points(x: &Four) -> [[f64; 2]; 3] {
+    let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
+    ARC_POINTS.map(|c| [0, 1].map(|k| (0..4).map(|n| c[n] * d[n][k]).sum()))
+}
+
+/// The products, positive where the loop is star-shaped (traversed with the chart on its left).
+pub(super) fn arc_products(x: &Four) -> [f64; 3] {
+    let p = arc_points(x);
+    ARC_PAIRS.map(|(i, j)| -cross(p[i], p[j]))
+}
+
+/// What is linear in t in the products of `x + t y`.
+pub(super) fn arc_mixed(x: &Four, y: &Four) -> [f64; 3] {
+    let (p, q) = (arc_points(x), arc_points(y));
+    ARC_PAIRS.map(|(i, j)| -cross(p[i], q[j]) - cross(q[i], p[j]))
+}
+
+/// The gradient of product `k` with respect to the eight nodal values.
+pub(super) fn arc_gradient(x: &Four, k: usize) -> [f64; 8] {
+    let p = arc_points(x);
+    let (i, j) = ARC_PAIRS[k];
+    let mut g = [0.0; 8];
+    for n in 0..4 {
+        let (ga, gb) = (ARC_POINTS[i][n], ARC_POINTS[j][n]);
+        g[2 * n] = -(ga * p[j][1] - gb * p[i][1]);
+        g[2 * n + 1] = -(gb * p[i][0] - ga * p[j][0]);
+    }
+    g
+}
+
+/// The least t > 0 at which c0 + c1 t + c2 t^2 falls to zero, where c0 > 0; infinity where it never does.
+pub(super) fn first_zero(c0: f64, c1: f64, c2: f64) -> f64 {
+    let discriminant = c1 * c1 - 4.0 * c0 * c2;
+    if c2 > 0.0 && (c1 >= 0.0 || discriminant < 0.0) {
+        return f64::INFINITY;
+    }
+    // The form of the root that does not cancel where c1 < 0.
+    let root = discriminant.max(0.0).sqrt();
+    let t = if c1 <= 0.0 { 2.0 * c0 / (root - c1) } else { -(c1 + root) / (2.0 * c2) };
+    if t > 0.0 { t } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const X: Six = [[0.0, 0.1], [1.0, 0.0], [0.2, 0.9], [0.5, -0.1], [0.7, 0.5], [0.1, 0.6]];
+    const Y: Six = [[0.3, 0.0], [-0.2, 0.1], [0.0, 0.4], [0.1, 0.2], [-0.3, 0.1], [0.2, -0.5]];
+
+    fn moved(t: f64) -> Six {
+        std::array::from_fn(|n| [X[n][0] + t * Y[n][0], X[n][1] + t * Y[n][1]])
+    }
+
+    #[test]
+    fn coefficients_are_those_of_the_exact_ones() {
+        use crate::grid::GridPoint;
+        let vertex = |n: usize| if n < 3 { GridPoint::vertex(X[n]) } else { GridPoint::mid(X[n]) };
+        let exact = crate::bernstein::ExactDet::new(std::array::from_fn(vertex)).coefficients();
+        for (a, b) in Corners::new(&X).dets().into_iter().zip(exact) {
+            assert!((a - b).abs() < 1e-14, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn coefficients_along_a_line_are_quadratic() {
+        let (x, y) = (Corners::new(&X), Corners::new(&Y));
+        for k in 0..6 {
+            let at = |t: f64| Corners::new(&moved(t)).dets()[k];
+            let quadratic = |t: f64| x.dets()[k] + t * x.mixed(&y)[k] + t * t * y.dets()[k];
+            assert!((at(0.7) - quadratic(0.7)).abs() < 1e-14);
+            let slope: f64 = (0..12).map(|i| x.gradient(k)[i] * Y[i / 2][i % 2]).sum();
+            assert!((slope - x.mixed(&y)[k]).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn arcs_along_a_line_are_quadratic() {
+        let four = |s: &Six| -> Four { [s[0], s[3], s[1], s[5]] };
+        let (x, y) = (four(&X), four(&Y));
+        for k in 0..3 {
+            let quadratic = arc_products(&x)[k] + 0.7 * arc_mixed(&x, &y)[k] + 0.49 * arc_products(&y)[k];
+            assert!((arc_products(&four(&moved(0.7)))[k] - quadratic).abs() < 1e-14);
+            let slope: f64 = (0..8).map(|i| arc_gradient(&x, k)[i] * y[i / 2][i % 2]).sum();
+            assert!((slope - arc_mixed(&x, &y)[k]).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn the_kept_curvature_is_positive_and_above_the_true_one() {
+        // -d^2/dt^2 of each coefficient along a direction is at most the kept form: what is dropped is negative.
+        let shape = TriangleShape { lengths: [1.0, 0.7, 0.9] };
+        for k in 0..6 {
+            let mut push = [0.0; 6];
+            push[k] = 1.0;
+            let mut form = Form::of_stiffness([[0.0; 6]; 6]);
+            form.add_curvature(&shape, &push);
+            let h = form.matrix();
+            for (direction, sign) in [(&X, 1.0), (&Y, -1.0)] {
+                let d: Vec<f64> = direction.iter().flatten().map(|c| c * sign).collect();
+                let kept: f64 = (0..12).map(|i| (0..12).map(|j| d[i] * h[i][j] * d[j]).sum::<f64>()).sum();
+                let curvature = -2.0 * Corners::new(direction).dets()[k];
+                assert!(kept >= 0.0 && kept >= curvature - 1e-12, "{k}: {kept} {curvature}");
+            }
+        }
+    }
+
+    #[test]
+    fn zeros_are_found_on_both_branches() {
+        assert_eq!(first_zero(1.0, -1.0, 0.0), 1.0);
+        assert_eq!(first_zero(2.0, -3.0, 1.0), 1.0);
+        assert_eq!(first_zero(2.0, 1.0, -1.0), 2.0);
+        assert_eq!(first_zero(1.0, -1.0, 1.0), f64::INFINITY);
+        assert_eq!(first_zero(1.0, 1.0, 1.0), f64::INFINITY);
+        assert_eq!(first_zero(1.0, 1.0, 0.0), f64::INFINITY);
+        assert_eq!(first_zero(1.0, 0.0, -4.0), 0.5);
+    }
+}

@@ -1,0 +1,56 @@
+use super::*;
+use crate::boundary::{Boundary, Mids};
+use crate::linear::{linear_map, lower_ears};
+use crate::mesh::TriangleSoup;
+use crate::quadratic::quadratic_map;
+use crate::{decompose, repair, shapes};
+
+/// A chart with its feasible start and its harmonic map.
+fn prepared(soup: &TriangleSoup) -> (ClosedChart, Vec<GridPoint>, QuadraticMap) {
+    let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
+    let chart = ClosedChart::new(&decompose(&mesh).expect("one chart").charts()[0]);
+    let mut boundary = Boundary::circle(&chart, Mids::Arc);
+    let linear = linear_map(&chart, &boundary).expect("maps");
+    lower_ears(&chart, &linear, &mut boundary);
+    let harmonic = quadratic_map(&chart, &boundary).expect("solves");
+    let start = linear.raised(&chart, &boundary);
+    (chart, start, harmonic)
+}
+
+fn check(chart: &ClosedChart, untangled: &Untangled) {
+    assert!(valid(chart, &untangled.nodes).is_some());
+    let report = &untangled.report;
+    assert!(report.energy >= report.energy_harmonic * (1.0 - 1e-12), "{report:?}");
+    assert!(report.energy <= report.energy_start * (1.0 + 1e-12), "{report:?}");
+}
+
+#[test]
+fn a_valid_harmonic_map_is_left_alone() {
+    let (chart, start, harmonic) = prepared(&shapes::disk(8));
+    assert!(harmonic.invalid().is_empty());
+    let got = untangle(&chart, &start, &harmonic);
+    assert_eq!((got.report.method, got.report.nodes_moved), (Method::Harmonic, 0));
+}
+
+#[test]
+fn the_small_examples_are_untangled() {
+    for soup in [shapes::folding_three(), shapes::folding_six()] {
+        let (chart, start, harmonic) = prepared(&soup);
+        assert!(!harmonic.invalid().is_empty());
+        let got = untangle(&chart, &start, &harmonic);
+        assert_eq!(got.report.method, Method::Feasible, "a third of the triangles is invalid");
+        check(&chart, &got);
+    }
+}
+
+#[test]
+fn a_bent_disk_is_untangled_close_to_the_harmonic_map() {
+    let (chart, start, harmonic) = prepared(&shapes::bent_disk(32, 0.45));
+    assert!(harmonic.invalid().len() > 10, "{} invalid", harmonic.invalid().len());
+    let got = untangle(&chart, &start, &harmonic);
+    eprintln!("{} {} {:?}", chart.own_triangles(), harmonic.invalid().len(), got.report);
+    check(&chart, &got);
+    let mut effort = Effort::default();
+    let nodes = feasible::untangle(&chart, &start, &mut effort).expect("feasible");
+    eprintln!("feasible {} {:?}", energy(&chart, &nodes), effort);
+}
