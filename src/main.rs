@@ -1,1 +1,29 @@
-fn main() {}
+//! The command `planish`.
+
+use clap::Parser;
+use planish::cli::{Cli, Verb};
+use planish::verbs::{self, Exit};
+use planish::{logging, settings::Settings};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let ended = cli.verb.settings().map_err(Into::into).and_then(|settings| {
+        logging::start(&settings);
+        dispatch(&cli.verb, &settings)
+    });
+    ended
+        .unwrap_or_else(|error| {
+            eprintln!("planish: {error}");
+            Exit::Usage
+        })
+        .into()
+}
+
+fn dispatch(verb: &Verb, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
+    match verb {
+        Verb::Run(run) => verbs::run::run(&run.inputs, settings),
+        Verb::Check(check) => Ok(verbs::check::check(&check.results, settings.quiet)),
+        Verb::Info(info) => verbs::info::info(&info.inputs, info.json, settings),
+    }
+}

@@ -55,6 +55,11 @@ impl Chart {
         self.shapes[face].area() / self.scale / self.scale
     }
 
+    /// The power of two by which lengths in the unit of the input become those of the shapes.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
     /// The edges, numbered within the chart.
     pub fn edges(&self) -> &EdgeTable {
         &self.edges

@@ -1,0 +1,129 @@
+//! File formats: which there are, and reading a soup of triangles from the bytes of a file.
+
+mod obj;
+mod polygon;
+mod stl;
+pub mod vtu;
+
+use crate::outcome::{Code, Reason};
+use pipeline::mesh::{SoupError, TriangleSoup};
+use std::path::Path;
+
+/// A format that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Stereolithography, ASCII or binary.
+    Stl,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+/// What the name of a file says about it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A mesh that planish reads.
+    Mesh(Format),
+    /// A mesh in a format that this version does not read.
+    OtherMesh(String),
+    /// Something that lies beside meshes: materials, pictures, hidden and temporary files.
+    NoMesh,
+    /// An extension that planish does not know, or none.
+    Unknown(String),
+}
+
+/// Extensions of meshes in formats that this version does not read.
+const OTHER_MESHES: [&str; 8] = ["ply", "gltf", "glb", "vtk", "vtu", "vtp", "msh", "off"];
+
+/// Extensions of what lies beside meshes.
+const NO_MESHES: [&str; 13] =
+    ["mtl", "bin", "png", "jpg", "jpeg", "bmp", "tga", "txt", "md", "json", "tmp", "part", "crdownload"];
+
+/// Tells the kind of a file by its name.
+pub fn kind(path: &Path) -> Kind {
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    match extension.as_str() {
+        _ if name.starts_with('.') || name.ends_with('~') => Kind::NoMesh,
+        "stl" => Kind::Mesh(Format::Stl),
+        "obj" => Kind::Mesh(Format::Obj),
+        e if OTHER_MESHES.contains(&e) => Kind::OtherMesh(extension),
+        e if NO_MESHES.contains(&e) => Kind::NoMesh,
+        _ => Kind::Unknown(extension),
+    }
+}
+
+/// Why the bytes of a file are no soup.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub enum ReadError {
+    /// There are no bytes.
+    #[error("the file is empty (0 bytes); export it again")]
+    Empty,
+    /// Not an STL file.
+    #[error(transparent)]
+    Stl(#[from] stl::StlError),
+    /// Not an OBJ file.
+    #[error(transparent)]
+    Obj(#[from] obj::ObjError),
+    /// What was read makes no sense.
+    #[error(transparent)]
+    Soup(#[from] SoupError),
+}
+
+impl ReadError {
+    /// The refusal that this error means.
+    pub fn reason(&self) -> Reason {
+        let (code, place) = match self {
+            Self::Empty => (Code::EmptyFile, Some("byte 0".to_owned())),
+            Self::Stl(e) => (e.code(), e.place()),
+            Self::Obj(e) => (e.code(), e.place()),
+            Self::Soup(e) => soup_reason(e),
+        };
+        Reason { code, message: self.to_string(), place }
+    }
+}
+
+fn soup_reason(error: &SoupError) -> (Code, Option<String>) {
+    match error {
+        SoupError::NoTriangles { .. } => (Code::NoTriangles, None),
+        SoupError::NotFinite { point, .. } => (Code::NotFinite, Some(format!("point {point}"))),
+        SoupError::IndexOutOfRange { triangle, .. } => (Code::Malformed, Some(format!("triangle {triangle}"))),
+        SoupError::TooLarge { .. } => (Code::TooLarge, None),
+    }
+}
+
+/// Reads the bytes of a file.
+///
+/// # Errors
+/// [`ReadError`], with the place and what to do.
+pub fn read(format: Format, bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
+    if bytes.is_empty() {
+        return Err(ReadError::Empty);
+    }
+    match format {
+        Format::Stl => stl::read(bytes),
+        Format::Obj => obj::read(bytes),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_kinds() {
+        assert_eq!(kind(Path::new("a/Part.STL")), Kind::Mesh(Format::Stl));
+        assert_eq!(kind(Path::new("scan.obj")), Kind::Mesh(Format::Obj));
+        assert_eq!(kind(Path::new("scan.ply")), Kind::OtherMesh("ply".to_owned()));
+        for beside in ["scan.mtl", ".scan.stl", "scan.stl.part", "scan.obj~", "a.png"] {
+            assert_eq!(kind(Path::new(beside)), Kind::NoMesh, "{beside}");
+        }
+        assert_eq!(kind(Path::new("scan.xyz")), Kind::Unknown("xyz".to_owned()));
+        assert_eq!(kind(Path::new("scan")), Kind::Unknown(String::new()));
+    }
+
+    #[test]
+    fn an_empty_file_is_refused_with_its_place() {
+        let reason = read(Format::Stl, b"").expect_err("empty").reason();
+        assert_eq!((reason.code, reason.place.as_deref()), (Code::EmptyFile, Some("byte 0")));
+    }
+}

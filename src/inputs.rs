@@ -1,0 +1,93 @@
+//! Which files a command is about.
+
+use crate::formats::{Kind, kind};
+use crate::job::Job;
+use std::path::{Path, PathBuf};
+
+/// Why inputs are refused as a whole: wrong usage.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// A folder cannot be listed.
+    #[error("cannot list {path}: {error}")]
+    Unreadable {
+        /// The path.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// A folder holds no mesh.
+    #[error("the folder {0} holds no mesh file; name a file or another folder")]
+    EmptyFolder(PathBuf),
+    /// Two inputs have the same name.
+    #[error(
+        "{0} and {1} have the same name, so that their results would overwrite each other; rename one, or use two output folders"
+    )]
+    SameName(PathBuf, PathBuf),
+}
+
+/// The jobs for files and folders: files as they are named, folders in the order of names. In folders, files that
+/// hold no mesh (materials, pictures, hidden and temporary files, unknown extensions) are passed over.
+///
+/// # Errors
+/// [`InputError`].
+pub fn collect(inputs: &[PathBuf]) -> Result<Vec<Job>, InputError> {
+    let mut jobs = Vec::new();
+    for input in inputs {
+        // A file that does not exist becomes a job too: it is refused, and the others are done all the same.
+        if input.is_dir() {
+            jobs.extend(folder(input)?);
+        } else {
+            jobs.push(Job::new(input.clone()));
+        }
+    }
+    let mut by_name: Vec<&Job> = jobs.iter().collect();
+    by_name.sort_by(|a, b| a.name.cmp(&b.name));
+    match by_name.windows(2).find(|w| w[0].name == w[1].name) {
+        Some(same) => Err(InputError::SameName(same[0].path.clone(), same[1].path.clone())),
+        None => Ok(jobs),
+    }
+}
+
+fn unreadable(path: &Path) -> impl FnOnce(std::io::Error) -> InputError {
+    let path = path.to_owned();
+    move |error| InputError::Unreadable { path, error }
+}
+
+fn folder(path: &Path) -> Result<Vec<Job>, InputError> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(unreadable(path))? {
+        let file = entry.map_err(unreadable(path))?.path();
+        let mesh = matches!(kind(&file), Kind::Mesh(_) | Kind::OtherMesh(_));
+        if file.is_file() && mesh {
+            files.push(file);
+        } else if file.is_file() {
+            tracing::info!(file = %file.display(), "passed over: no mesh");
+        }
+    }
+    if files.is_empty() {
+        return Err(InputError::EmptyFolder(path.to_owned()));
+    }
+    files.sort();
+    Ok(files.into_iter().map(Job::new).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_give_their_meshes_in_order() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for name in ["b.stl", "a.obj", "a.mtl", ".hidden.stl", "notes", "c.ply"] {
+            std::fs::write(folder.path().join(name), "x").expect("written");
+        }
+        let jobs = collect(&[folder.path().to_owned()]).expect("meshes");
+        let names: Vec<_> = jobs.iter().map(|j| j.name.to_string_lossy().into_owned()).collect();
+        assert_eq!(names, ["a.obj", "b.stl", "c.ply"]);
+        let twice = [folder.path().to_owned(), folder.path().join("b.stl")];
+        assert!(matches!(collect(&twice), Err(InputError::SameName(..))));
+        let none = tempfile::tempdir().expect("a folder");
+        assert!(matches!(collect(&[none.path().to_owned()]), Err(InputError::EmptyFolder(_))));
+        assert_eq!(collect(&[none.path().join("gone.stl")]).expect("a job, to be refused").len(), 1);
+    }
+}

@@ -1,0 +1,308 @@
+//! One input as it travels: from its file to its published result.
+
+use crate::formats::{self, Kind, vtu};
+use crate::outcome::{Code, Reason, Status};
+use crate::publish::{PublishError, Publisher};
+use crate::report::{self, Input, Output, Report};
+use crate::settings::{Order, Settings};
+use pipeline::distortion::{self, CellFields};
+use pipeline::mesh::TriangleSoup;
+use pipeline::repair::Repaired;
+use pipeline::{CertifiedChart, MapError, decompose, finish_chart, map_chart, repair};
+use rustix::time::{ClockId, clock_gettime};
+use std::ffi::OsString;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// An input with the name of its result.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Job {
+    /// The file.
+    pub path: PathBuf,
+    /// Its whole name: that of the result folder.
+    pub name: OsString,
+}
+
+/// The stages, as progress is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Reading bytes and decoding them.
+    Read,
+    /// Repair and decomposition.
+    Decompose,
+    /// Linear and harmonic maps.
+    Map,
+    /// Untangling and proving.
+    Untangle,
+    /// Measuring, encoding, publishing.
+    Write,
+}
+
+impl Stage {
+    /// The name of the stage.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Read => "read",
+            Self::Decompose => "decompose",
+            Self::Map => "map",
+            Self::Untangle => "untangle",
+            Self::Write => "write",
+        }
+    }
+}
+
+/// What became of a job.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Done {
+    /// The report, as it stands on disk.
+    pub report: Report,
+    /// Whether an older result was up to date.
+    pub up_to_date: bool,
+}
+
+/// A result before it is published: its report and the other files.
+struct Result_ {
+    report: Report,
+    files: Vec<(String, Vec<u8>)>,
+}
+
+/// CPU seconds of this thread.
+fn cpu_seconds() -> f64 {
+    let t = clock_gettime(ClockId::ThreadCPUTime);
+    t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
+}
+
+/// Tells the stages to whoever watches, and times them.
+struct Clock<'a> {
+    tell: &'a dyn Fn(Stage),
+    started: f64,
+    stage: Stage,
+}
+
+impl<'a> Clock<'a> {
+    fn new(tell: &'a dyn Fn(Stage)) -> Self {
+        tell(Stage::Read);
+        Self { tell, started: cpu_seconds(), stage: Stage::Read }
+    }
+
+    /// Ends the stage at hand, books its time, begins `next`.
+    fn next(&mut self, report: &mut Report, next: Stage) {
+        let now = cpu_seconds();
+        // Milliseconds are enough, and read well.
+        let spent = ((now - self.started) * 1e3).round() / 1e3;
+        *report.timing.entry(self.stage.name().to_owned()).or_insert(0.0) += spent;
+        self.started = now;
+        if next != self.stage {
+            tracing::debug!(stage = next.name(), "stage begins");
+            (self.tell)(next);
+        }
+        self.stage = next;
+    }
+}
+
+impl Job {
+    /// The job for a file.
+    pub fn new(path: PathBuf) -> Self {
+        let name = path.file_name().map(ToOwned::to_owned).unwrap_or_default();
+        Self { path, name }
+    }
+
+    /// Processes the input and publishes its result; `tell` hears of each stage as it begins.
+    ///
+    /// # Errors
+    /// [`PublishError`] where the result cannot be written. Anything else is told by the result itself.
+    pub fn run(&self, settings: &Settings, publisher: &Publisher, tell: &dyn Fn(Stage)) -> Result<Done, PublishError> {
+        let span = tracing::info_span!("job", input = %self.name.display());
+        let _in_span = span.enter();
+        tracing::info!("begins");
+        let mut clock = Clock::new(tell);
+        let content = read_file(&self.path);
+        let mut report = Report::new(self.input(content.as_deref().ok()), settings);
+        if !settings.force
+            && let Some(older) = self.up_to_date(publisher, &report)
+        {
+            tracing::info!(status = %older.status, "is up to date");
+            return Ok(Done { report: older, up_to_date: true });
+        }
+        let files = match content.and_then(|bytes| self.process(&bytes, settings, &mut report, &mut clock)) {
+            Ok(files) => files,
+            Err(reason) => {
+                report.status = reason.status();
+                report.reason = Some(reason);
+                vec![]
+            }
+        };
+        self.publish(Result_ { report, files }, publisher, &mut clock)
+    }
+
+    fn input(&self, content: Option<&[u8]>) -> Input {
+        Input {
+            name: self.name.to_string_lossy().into_owned(),
+            bytes: content.map(|c| c.len() as u64),
+            blake3: content.map(|c| blake3::hash(c).to_hex().to_string()),
+        }
+    }
+
+    /// The published report, if it is that of the same content, settings and version, and its files are there.
+    fn up_to_date(&self, publisher: &Publisher, fresh: &Report) -> Option<Report> {
+        let folder = publisher.target(&self.name);
+        let older: Report = serde_json::from_slice(&std::fs::read(folder.join(report::FILE)).ok()?).ok()?;
+        let same = older.input == fresh.input
+            && fresh.input.blake3.is_some()
+            && older.settings == fresh.settings
+            && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
+            && older.status != Status::Failed;
+        let there = |o: &Output| std::fs::metadata(folder.join(&o.file)).is_ok_and(|m| m.len() == o.bytes);
+        (same && older.outputs.iter().all(there)).then_some(older)
+    }
+
+    /// Runs the stages; a panic in one of them is a failure of this job, not of the program.
+    fn process(
+        &self,
+        bytes: &[u8],
+        settings: &Settings,
+        report: &mut Report,
+        clock: &mut Clock,
+    ) -> Result<Vec<(String, Vec<u8>)>, Reason> {
+        let stages = || {
+            let soup = self.read(bytes)?;
+            stages(&soup, settings, report, clock)
+        };
+        catch_unwind(AssertUnwindSafe(stages)).unwrap_or_else(|_| {
+            let message =
+                "planish broke down on this input: that is a fault of planish; please report it with the file";
+            Err(Reason::new(Code::Internal, message))
+        })
+    }
+
+    /// Decodes the bytes by the extension of the file.
+    pub fn read(&self, bytes: &[u8]) -> Result<TriangleSoup, Reason> {
+        let refuse = |code, message: String| Err(Reason { code, message, place: Some("file name".to_owned()) });
+        match formats::kind(&self.path) {
+            Kind::Mesh(format) => formats::read(format, bytes).map_err(|e| e.reason()),
+            Kind::OtherMesh(e) => refuse(
+                Code::UnsupportedFormat,
+                format!("this version reads .stl and .obj, not .{e}; convert the file to one of these"),
+            ),
+            Kind::NoMesh => {
+                refuse(Code::NotAMesh, "a file of this name holds no mesh; name an .stl or .obj file".to_owned())
+            }
+            Kind::Unknown(e) if e.is_empty() => refuse(
+                Code::UnknownExtension,
+                "the file name has no extension; rename the file to end in .stl or .obj, whichever it is".to_owned(),
+            ),
+            Kind::Unknown(e) => refuse(
+                Code::UnknownExtension,
+                format!("the extension .{e} is not known; planish reads .stl and .obj: rename or convert the file"),
+            ),
+        }
+    }
+
+    fn publish(&self, result: Result_, publisher: &Publisher, clock: &mut Clock) -> Result<Done, PublishError> {
+        let Result_ { mut report, mut files } = result;
+        report.outputs = files.iter().map(|(name, content)| Output::of(name, content)).collect();
+        clock.next(&mut report, Stage::Write);
+        // A report holds finite numbers and plain strings: it always becomes JSON.
+        let json = report.to_json().unwrap_or_default();
+        files.push((report::FILE.to_owned(), json));
+        publisher.publish(&self.name, &files)?;
+        match &report.reason {
+            None => tracing::info!(status = %report.status, charts = report.charts.len(), "ends"),
+            Some(r) if report.status == Status::Refused => {
+                tracing::warn!(code = r.code.name(), "refused: {}", r.message)
+            }
+            Some(r) => tracing::error!(code = r.code.name(), "failed: {}", r.message),
+        }
+        Ok(Done { report, up_to_date: false })
+    }
+}
+
+/// Reads a regular file whole. Anything else (a folder, a pipe, a device) could block for ever.
+pub fn read_file(path: &Path) -> Result<Vec<u8>, Reason> {
+    let unreadable = |why: String| Reason::new(Code::Unreadable, format!("cannot read the file: {why}"));
+    let metadata = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?;
+    if !metadata.is_file() {
+        return Err(unreadable("it is no regular file".to_owned()));
+    }
+    std::fs::read(path).map_err(|e| unreadable(e.to_string()))
+}
+
+/// Repairs a soup, which puts everything known about the surface into the report.
+fn repaired(soup: &TriangleSoup, settings: &Settings, report: &mut Report) -> Result<Repaired, Reason> {
+    let found = repair(soup, &pipeline::repair::Settings { weld: settings.weld });
+    let found = found.map_err(|e| Reason::new(Code::OnlyDegenerate, e))?;
+    report.surface = Some(report::surface(&found));
+    report.repairs = Some(report::repairs(&found.report));
+    Ok(found)
+}
+
+/// From a soup to the files of a certified result.
+fn stages(
+    soup: &TriangleSoup,
+    settings: &Settings,
+    report: &mut Report,
+    clock: &mut Clock,
+) -> Result<Vec<(String, Vec<u8>)>, Reason> {
+    clock.next(report, Stage::Decompose);
+    let found = repaired(soup, settings, report)?;
+    let atlas = decompose(&found.mesh).map_err(|e| Reason::new(Code::NeedsDecomposition, e))?;
+    let order = if settings.order == Order::Linear { pipeline::Order::Linear } else { pipeline::Order::Quadratic };
+    let mut done = Vec::new();
+    for chart in atlas.charts() {
+        clock.next(report, Stage::Map);
+        let mapped = map_chart(chart, order).map_err(|e| map_refusal(&e))?;
+        clock.next(report, Stage::Untangle);
+        done.push(finish_chart(mapped));
+    }
+    clock.next(report, Stage::Write);
+    let fields: Vec<_> = atlas.charts().iter().zip(&done).map(|(c, d)| distortion::fields(c, &d.certified)).collect();
+    for ((chart, done), fields) in atlas.charts().iter().zip(&done).zip(&fields) {
+        warn_if_unsolved(chart, done);
+        let summary = distortion::summary(chart, &done.certified, fields);
+        report.charts.push(report::chart_report(chart, done, fields, &summary));
+    }
+    report.status = Status::Certified;
+    encode(&found, atlas.charts(), &done, &fields)
+}
+
+fn map_refusal(error: &MapError) -> Reason {
+    let code = match error {
+        MapError::Linear(pipeline::linear::Error::Solver(pipeline::sparse::Error::TooLarge { .. })) => Code::TooLarge,
+        _ => Code::NeedsSplit,
+    };
+    let place = match error {
+        MapError::Linear(pipeline::linear::Error::Folded { first, .. }) => Some(format!("triangle {first}")),
+        _ => None,
+    };
+    Reason { code, message: error.to_string(), place }
+}
+
+fn warn_if_unsolved(chart: &pipeline::atlas::Chart, done: &CertifiedChart) {
+    if let Some(error) = &done.unsolved {
+        tracing::warn!(chart = %chart.id(), "no harmonic map ({error}): the linear one, raised, is published");
+    }
+}
+
+/// Encodes surface.vtu and param.vtu.
+fn encode(
+    found: &Repaired,
+    charts: &[pipeline::atlas::Chart],
+    done: &[CertifiedChart],
+    fields: &[Vec<CellFields>],
+) -> Result<Vec<(String, Vec<u8>)>, Reason> {
+    let none = |chart: &pipeline::atlas::Chart| vec![false; chart.triangles().len()];
+    let invalid = |(c, d): (&_, &CertifiedChart)| d.harmonic.as_ref().map_or(none(c), |h| h.invalid.clone());
+    let untangled: Vec<Vec<bool>> = charts.iter().zip(done).map(invalid).collect();
+    let view = |i: usize| vtu::ChartView {
+        mesh: &found.mesh,
+        chart: &charts[i],
+        map: &done[i].certified,
+        fields: &fields[i],
+        untangled: &untangled[i],
+    };
+    let views: Vec<_> = (0..charts.len()).map(view).collect();
+    let failed = |e: vtu::VtuError| Reason::new(Code::Internal, format!("the result cannot be encoded: {e}"));
+    let surface = vtu::surface(&views).map_err(failed)?;
+    let param = vtu::param(&views).map_err(failed)?;
+    Ok(vec![("surface.vtu".to_owned(), surface), ("param.vtu".to_owned(), param)])
+}

@@ -1,0 +1,25 @@
+//! Log messages, on standard error.
+
+use crate::settings::{Log, Settings};
+use tracing::level_filters::LevelFilter;
+
+/// Starts logging. A panic becomes a log message too: it is caught per job, and told there.
+pub fn start(settings: &Settings) {
+    let level = match (settings.quiet, settings.verbose) {
+        (true, _) => LevelFilter::ERROR,
+        // What is refused is told by the summary already.
+        (false, 0) => LevelFilter::ERROR,
+        (false, 1) => LevelFilter::INFO,
+        (false, 2) => LevelFilter::DEBUG,
+        (false, _) => LevelFilter::TRACE,
+    };
+    let builder = tracing_subscriber::fmt().with_max_level(level).with_writer(std::io::stderr).with_target(false);
+    // A second call, as tests make it, keeps the first subscriber.
+    let _ = match settings.log {
+        Log::Text => tracing::subscriber::set_global_default(builder.finish()),
+        Log::Json => tracing::subscriber::set_global_default(builder.json().finish()),
+    };
+    std::panic::set_hook(Box::new(|panic| {
+        tracing::debug!(place = %panic.location().map(ToString::to_string).unwrap_or_default(), "panic: {panic}");
+    }));
+}

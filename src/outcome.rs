@@ -1,0 +1,90 @@
+//! How an input ended: certified, refused or failed, and why.
+
+use serde::{Deserialize, Serialize};
+
+/// The state of an input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Every chart has a proven map.
+    Certified,
+    /// The input cannot be processed.
+    Refused,
+    /// planish broke down.
+    Failed,
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Certified => "certified",
+            Self::Refused => "refused",
+            Self::Failed => "failed",
+        })
+    }
+}
+
+/// Why an input was refused or failed: a stable list that scripts may rely on (see docs/report.md).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Code {
+    /// The file cannot be opened or read.
+    Unreadable,
+    /// The extension is none that planish knows.
+    UnknownExtension,
+    /// A mesh format that this version does not read.
+    UnsupportedFormat,
+    /// The file is none that holds a mesh.
+    NotAMesh,
+    /// The file has no bytes.
+    EmptyFile,
+    /// The file does not follow its format.
+    Malformed,
+    /// Declared counts and size disagree.
+    CountMismatch,
+    /// A coordinate is not a number, infinite, or above 1e100.
+    NotFinite,
+    /// There is no triangle.
+    NoTriangles,
+    /// Every triangle has two equal vertices.
+    OnlyDegenerate,
+    /// More elements than planish can number.
+    TooLarge,
+    /// The surface is not one disk, with or without holes.
+    NeedsDecomposition,
+    /// A chart is too distorted for one map.
+    NeedsSplit,
+    /// A fault of planish.
+    Internal,
+}
+
+/// A refusal or failure, told.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reason {
+    /// What kind of reason.
+    pub code: Code,
+    /// What is wrong and what to do.
+    pub message: String,
+    /// Where: line, byte, triangle or vertex.
+    #[serde(rename = "where")]
+    pub place: Option<String>,
+}
+
+impl Reason {
+    /// A reason without a place.
+    pub fn new(code: Code, message: impl ToString) -> Self {
+        Self { code, message: message.to_string(), place: None }
+    }
+
+    /// The state that this reason leads to.
+    pub fn status(&self) -> Status {
+        if self.code == Code::Internal { Status::Failed } else { Status::Refused }
+    }
+}
+
+impl Code {
+    /// The code as it is written.
+    pub fn name(self) -> String {
+        serde_json::to_value(self).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+    }
+}

@@ -1,0 +1,179 @@
+//! Publishing: files are complete in the output folder, or not there.
+//!
+//! The files of an input are written to a staging folder (`OUT/.planish/...`), brought to disk, and renamed into
+//! place in one step; an older result stays until then. Each process has a staging folder of its own, held by a
+//! lock; folders whose process is gone are cleared at the next start.
+
+use std::ffi::OsStr;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// The hidden folder for what is not complete yet.
+const STAGING: &str = ".planish";
+
+/// The file whose lock tells that a staging folder is in use.
+const LOCK: &str = "lock";
+
+/// The file whose lock a process holds while it makes its staging folder.
+const GATE: &str = "opening";
+
+/// Publishes results in one output folder.
+#[derive(Debug)]
+pub struct Publisher {
+    out: PathBuf,
+    staging: tempfile::TempDir,
+    _lock: File,
+}
+
+/// Why nothing could be published.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {path}: {error}; check that the disk has room and the folder may be written")]
+pub struct PublishError {
+    path: PathBuf,
+    error: io::Error,
+}
+
+/// Attaches the path to an I/O error.
+fn at(path: &Path) -> impl FnOnce(io::Error) -> PublishError {
+    let path = path.to_owned();
+    move |error| PublishError { path, error }
+}
+
+impl Publisher {
+    /// Opens (and makes) the output folder, and clears what dead processes left behind.
+    ///
+    /// # Errors
+    /// [`PublishError`] where the folder cannot be written.
+    pub fn open(out: &Path) -> Result<Self, PublishError> {
+        let staging = out.join(STAGING);
+        fs::create_dir_all(&staging).map_err(at(&staging))?;
+        // One process at a time, so that a folder is never seen between being made and being locked.
+        let gate = staging.join(GATE);
+        let _opening = File::create(&gate).and_then(|f| f.lock().map(|()| f)).map_err(at(&gate))?;
+        clear_stale(&staging);
+        let own = tempfile::Builder::new().prefix("run-").tempdir_in(&staging).map_err(at(&staging))?;
+        let path = own.path().join(LOCK);
+        let lock = File::create(&path).and_then(|f| f.lock().map(|()| f)).map_err(at(&path))?;
+        Ok(Self { out: out.to_owned(), staging: own, _lock: lock })
+    }
+
+    /// Where the result of the input with this name is published.
+    pub fn target(&self, name: &OsStr) -> PathBuf {
+        self.out.join(name)
+    }
+
+    /// Publishes `files` as the result of the input `name`, all at once.
+    ///
+    /// # Errors
+    /// [`PublishError`]; then an older result is untouched.
+    pub fn publish(&self, name: &OsStr, files: &[(String, Vec<u8>)]) -> Result<(), PublishError> {
+        let parent = tempfile::tempdir_in(self.staging.path()).map_err(at(self.staging.path()))?;
+        let fresh = parent.path().join(name);
+        fs::create_dir(&fresh).map_err(at(&fresh))?;
+        for (file, bytes) in files {
+            let path = fresh.join(file);
+            write_synced(&path, bytes).map_err(at(&path))?;
+        }
+        sync_folder(&fresh).map_err(at(&fresh))?;
+        let target = self.target(name);
+        put_in_place(&fresh, &target, parent.path()).map_err(at(&target))?;
+        sync_folder(&self.out).map_err(at(&self.out))
+    }
+}
+
+fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = File::create_new(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+fn sync_folder(path: &Path) -> io::Result<()> {
+    File::open(path)?.sync_all()
+}
+
+/// Renames `fresh` to `target`. Where there is an older result the two change places in one step, and the older
+/// one goes with the staging folder; where the system cannot do that, the older one is moved away first.
+fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(target) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return fs::rename(fresh, target),
+        Err(e) => return Err(e),
+        Ok(_) => {}
+    }
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        match renameat_with(CWD, fresh, CWD, target, RenameFlags::EXCHANGE) {
+            Ok(()) => return Ok(()),
+            Err(rustix::io::Errno::INVAL | rustix::io::Errno::NOSYS) => {}
+            Err(e) => return Err(e.into()),
+        }
+    }
+    fs::rename(target, staging.join("older"))?;
+    fs::rename(fresh, target)
+}
+
+/// Removes staging folders whose lock nobody holds.
+fn clear_stale(staging: &Path) {
+    let Ok(entries) = fs::read_dir(staging) else { return };
+    for folder in entries.flatten().map(|e| e.path()).filter(|p| p.is_dir()) {
+        let lock = File::open(folder.join(LOCK));
+        let held = lock.as_ref().is_ok_and(|f| matches!(f.try_lock(), Err(TryLockError::WouldBlock)));
+        if !held && let Err(error) = fs::remove_dir_all(&folder) {
+            tracing::warn!(folder = %folder.display(), %error, "cannot clear an abandoned staging folder");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files(text: &str) -> Vec<(String, Vec<u8>)> {
+        vec![("a.txt".to_owned(), text.into()), ("b.txt".to_owned(), text.into())]
+    }
+
+    #[test]
+    fn a_newer_result_takes_the_place_of_an_older_one_whole() {
+        let out = tempfile::tempdir().expect("a folder");
+        let publisher = Publisher::open(out.path()).expect("opens");
+        let name = OsStr::new("part.stl");
+        let mut old = files("old");
+        old.push(("only-old.txt".to_owned(), vec![]));
+        publisher.publish(name, &old).expect("published");
+        publisher.publish(name, &files("new")).expect("published");
+        let target = publisher.target(name);
+        assert_eq!(fs::read_to_string(target.join("b.txt")).expect("there"), "new");
+        assert!(!target.join("only-old.txt").exists());
+        drop(publisher);
+        let visible = fs::read_dir(out.path()).expect("there").flatten().filter(|e| e.file_name() != STAGING);
+        assert_eq!(visible.count(), 1);
+        let hidden = fs::read_dir(out.path().join(STAGING)).expect("there").flatten().map(|e| e.file_name());
+        assert_eq!(hidden.collect::<Vec<_>>(), [GATE], "nothing else is left behind");
+    }
+
+    #[test]
+    fn a_failed_publication_leaves_the_older_result() {
+        let out = tempfile::tempdir().expect("a folder");
+        let publisher = Publisher::open(out.path()).expect("opens");
+        let name = OsStr::new("part.stl");
+        publisher.publish(name, &files("old")).expect("published");
+        let broken = vec![("a.txt".to_owned(), vec![]), ("no/such/folder.txt".to_owned(), vec![])];
+        assert!(publisher.publish(name, &broken).is_err());
+        assert_eq!(fs::read_to_string(publisher.target(name).join("a.txt")).expect("there"), "old");
+    }
+
+    #[test]
+    fn abandoned_staging_is_cleared_and_staging_in_use_is_not() {
+        let out = tempfile::tempdir().expect("a folder");
+        let abandoned = out.path().join(STAGING).join("run-dead");
+        fs::create_dir_all(&abandoned).expect("made");
+        fs::write(abandoned.join(LOCK), "").expect("written");
+        let first = Publisher::open(out.path()).expect("opens");
+        assert!(!abandoned.exists());
+        let second = Publisher::open(out.path()).expect("opens beside the first");
+        assert!(first.staging.path().exists());
+        second.publish(OsStr::new("b.stl"), &files("b")).expect("published");
+        first.publish(OsStr::new("a.stl"), &files("a")).expect("published");
+    }
+}

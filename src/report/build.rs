@@ -1,0 +1,149 @@
+//! From the core's numbers to the report's.
+
+use super::{
+    Boundary, Certificate, ChartReport, Counts, Distortion, Linear, Quadratic, RepairedSurface, Repairs, Surface,
+    Untangle,
+};
+use pipeline::CertifiedChart;
+use pipeline::atlas::Chart;
+use pipeline::certify::PlanarMap;
+use pipeline::distortion::{CellFields, Summary};
+use pipeline::mesh::Census;
+use pipeline::repair::{self, Repaired};
+use pipeline::{linear, untangle};
+
+/// The surface before and after repair.
+pub fn surface(repaired: &Repaired) -> Surface {
+    let bbox = repaired.mesh.bounding_box();
+    Surface {
+        raw: counts(&repaired.raw),
+        repaired: RepairedSurface {
+            counts: counts(repaired.mesh.census()),
+            area: repaired.mesh.area(),
+            bbox: [bbox.min, bbox.max],
+        },
+    }
+}
+
+fn counts(c: &Census) -> Counts {
+    Counts {
+        vertices: c.vertices,
+        triangles: c.triangles,
+        components: c.components,
+        boundary_loops: c.boundary_loops,
+        euler: c.euler,
+        genus: c.genus,
+        orientable: c.orientable,
+        nonmanifold_edges: c.nonmanifold_edges,
+        nonmanifold_vertices: c.nonmanifold_vertices,
+        inconsistent_edges: c.inconsistent_edges,
+    }
+}
+
+/// What repair did.
+pub fn repairs(report: &repair::Report) -> Repairs {
+    let named = [
+        ("duplicate_triangles", &report.duplicate_triangles),
+        ("degenerate_triangles", &report.degenerate_triangles),
+        ("flipped_triangles", &report.flipped_triangles),
+        ("split_vertices", &report.split_vertices),
+        ("mollified_triangles", &report.mollified_triangles),
+    ];
+    let first = named.iter().filter(|(_, f)| f.count > 0).map(|(n, f)| ((*n).to_owned(), f.first.clone())).collect();
+    Repairs {
+        welded: report.welded,
+        unreferenced_points: report.unreferenced_points,
+        cracks_closed: report.cracks_closed,
+        duplicate_triangles: report.duplicate_triangles.count,
+        degenerate_triangles: report.degenerate_triangles.count,
+        flipped_triangles: report.flipped_triangles.count,
+        split_vertices: report.split_vertices.count,
+        mollified_triangles: report.mollified_triangles.count,
+        mollified_by: report.mollified_by,
+        first,
+    }
+}
+
+/// A chart with its certified map.
+pub fn chart_report(chart: &Chart, done: &CertifiedChart, fields: &[CellFields], summary: &Summary) -> ChartReport {
+    let proof = done.certified.certificate();
+    let unit = chart.scale() * chart.scale();
+    let det_min = fields.iter().map(|f| f.det_min).fold(f64::MAX, f64::min);
+    ChartReport {
+        id: chart.id().0,
+        triangles: chart.triangles().len(),
+        loops: 1 + chart.holes().len(),
+        seams: vec![],
+        neighbours: vec![],
+        linear: Linear {
+            folded: done.linear.folded(),
+            edges_changed: done.linear.edges_changed(),
+            method: linear_method(done.linear.method()).to_owned(),
+        },
+        quadratic: done.harmonic.as_ref().map(|h| Quadratic {
+            invalid: h.invalid.iter().filter(|i| **i).count(),
+            det_min: (h.det_min * unit).clamp(f64::MIN, f64::MAX),
+        }),
+        untangle: done.untangle.as_ref().map(|u| untangling(u, det_min)),
+        certificate: Certificate {
+            proven: true,
+            by_bounds: proof.by_bounds,
+            by_exact: proof.by_exact,
+            depth: proof.depth,
+            det_lower_bound: proof.det_lower_bound,
+            boundary: Boundary {
+                argument: "star_shaped".to_owned(),
+                outer_arcs: proof.outer_arcs,
+                holes: proof.hole_centres.len(),
+            },
+            hole_centres: proof.hole_centres.iter().map(|c| c.uv()).collect(),
+            checksum: chart_checksum(done.certified.map()),
+        },
+        distortion: Distortion {
+            conformal_median: summary.conformal_median,
+            conformal_p99: summary.conformal_p99,
+            area_ratio: summary.area_ratio,
+        },
+    }
+}
+
+fn untangling(report: &untangle::Report, det_min: f64) -> Untangle {
+    let method = match report.method {
+        untangle::Method::Harmonic => "none",
+        untangle::Method::Patch => "patch",
+        untangle::Method::Feasible => "feasible",
+        untangle::Method::Start => "start",
+    };
+    Untangle {
+        method: method.to_owned(),
+        iterations: report.iterations,
+        nodes_moved: report.nodes_moved,
+        energy_harmonic: report.energy_harmonic,
+        energy_start: report.energy_start,
+        energy: report.energy,
+        energy_excess: (report.energy - report.energy_harmonic) / report.energy_harmonic,
+        gradient_norm: report.gradient_norm,
+        det_min,
+    }
+}
+
+fn linear_method(method: linear::Method) -> &'static str {
+    match method {
+        linear::Method::Harmonic => "harmonic",
+        linear::Method::MMatrix => "m_matrix",
+        linear::Method::MeanValue => "mean_value",
+    }
+}
+
+/// The checksum of a chart: blake3 over, little-endian, the number of cells (u32), the number of nodes (u32), the
+/// nodes of all cells (u32, numbered within the chart in the order of the file), the uv of all nodes (f64).
+pub fn chart_checksum(map: &PlanarMap) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&(map.cells.len() as u32).to_le_bytes());
+    hasher.update(&(map.nodes.len() as u32).to_le_bytes());
+    let cells: Vec<u8> = map.cells.iter().flatten().flat_map(|n| n.to_le_bytes()).collect();
+    let nodes: Vec<u8> = map.nodes.iter().flat_map(|p| p.uv()).flat_map(f64::to_le_bytes).collect();
+    hasher.update(&cells);
+    hasher.update(&nodes);
+    hasher.finalize().to_hex().to_string()
+}

@@ -1,0 +1,335 @@
+//! report.json: what was found, done and proven. The schema is in docs/report.schema.json; within version 1 it only
+//! grows.
+
+mod build;
+
+use crate::outcome::{Reason, Status};
+use crate::settings::{Order, Settings};
+pub use build::{chart_checksum, chart_report, repairs, surface};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The version of the schema.
+pub const SCHEMA: u32 = 1;
+
+/// The name of the report in a result folder.
+pub const FILE: &str = "report.json";
+
+/// The whole report.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Version of the schema.
+    pub schema: u32,
+    /// Version of planish.
+    pub planish: String,
+    /// The input file.
+    pub input: Input,
+    /// The settings that decide the result.
+    pub settings: ResultSettings,
+    /// How it ended.
+    pub status: Status,
+    /// Why it was refused or failed.
+    pub reason: Option<Reason>,
+    /// The surface, as far as it was read.
+    pub surface: Option<Surface>,
+    /// Components that were refused while others were certified.
+    pub refused_components: Vec<RefusedComponent>,
+    /// What repair did.
+    pub repairs: Option<Repairs>,
+    /// The charts.
+    pub charts: Vec<ChartReport>,
+    /// The curves between charts.
+    pub seams: Seams,
+    /// The other files of the result.
+    pub outputs: Vec<Output>,
+    /// CPU seconds per stage: the only part that differs from run to run.
+    pub timing: BTreeMap<String, f64>,
+}
+
+/// The input file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Input {
+    /// Its name.
+    pub name: String,
+    /// Its size; null where it could not be read.
+    pub bytes: Option<u64>,
+    /// The hash of its content.
+    pub blake3: Option<String>,
+}
+
+/// The settings that decide the result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResultSettings {
+    /// Order of the elements.
+    pub order: u8,
+    /// Tolerance for cracks.
+    pub weld: f64,
+}
+
+impl From<&Settings> for ResultSettings {
+    fn from(settings: &Settings) -> Self {
+        Self { order: if settings.order == Order::Linear { 1 } else { 2 }, weld: settings.weld }
+    }
+}
+
+/// A surface before and after repair.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Surface {
+    /// As read: bit-equal vertices merged.
+    pub raw: Counts,
+    /// As processed.
+    pub repaired: RepairedSurface,
+}
+
+/// The counts of a surface.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Vertices in use.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Parts connected through edges.
+    pub components: usize,
+    /// Closed boundary curves.
+    pub boundary_loops: usize,
+    /// Euler number.
+    pub euler: i64,
+    /// Handles; null where the surface is not orientable or not manifold.
+    pub genus: Option<u64>,
+    /// Whether it can be oriented.
+    pub orientable: bool,
+    /// Edges of three or more triangles.
+    pub nonmanifold_edges: usize,
+    /// Vertices where sheets touch.
+    pub nonmanifold_vertices: usize,
+    /// Edges whose triangles disagree about the direction.
+    pub inconsistent_edges: usize,
+}
+
+/// The surface after repair.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RepairedSurface {
+    /// The counts.
+    #[serde(flatten)]
+    pub counts: Counts,
+    /// Area in the unit of the input, squared.
+    pub area: f64,
+    /// Least and largest coordinates.
+    pub bbox: [[f64; 3]; 2],
+}
+
+/// A number of things and the first few of them.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Found {
+    /// How many.
+    pub count: usize,
+    /// The first ids: input triangles, or vertices after welding.
+    pub first: Vec<u32>,
+}
+
+/// What repair found and did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Repairs {
+    /// Points merged into a bit-equal one.
+    pub welded: usize,
+    /// Points that no triangle uses.
+    pub unreferenced_points: usize,
+    /// Pairs of open edges joined.
+    pub cracks_closed: usize,
+    /// Copies of a triangle, removed.
+    pub duplicate_triangles: usize,
+    /// Triangles with two equal vertices, removed.
+    pub degenerate_triangles: usize,
+    /// Triangles turned over.
+    pub flipped_triangles: usize,
+    /// Vertices given to several sheets.
+    pub split_vertices: usize,
+    /// Triangles whose area mollification changed by more than 1 %.
+    pub mollified_triangles: usize,
+    /// What was added to every edge length, in the unit of the input.
+    pub mollified_by: f64,
+    /// The first ids behind these counts.
+    pub first: BTreeMap<String, Vec<u32>>,
+}
+
+/// A component that was refused.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RefusedComponent {
+    /// Its number.
+    pub component: usize,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// A chart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChartReport {
+    /// Its number.
+    pub id: u32,
+    /// Its triangles.
+    pub triangles: usize,
+    /// Its boundary loops, the outer one included.
+    pub loops: usize,
+    /// Numbers of the seams around it.
+    pub seams: Vec<u32>,
+    /// Charts beside it.
+    pub neighbours: Vec<u32>,
+    /// The linear map.
+    pub linear: Linear,
+    /// The harmonic quadratic map; null for order 1, or where its system could not be solved.
+    pub quadratic: Option<Quadratic>,
+    /// Untangling; null where there was no quadratic map.
+    pub untangle: Option<Untangle>,
+    /// The proof.
+    pub certificate: Certificate,
+    /// The distortion.
+    pub distortion: Distortion,
+}
+
+/// The linear map of a chart.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Linear {
+    /// Triangles that the harmonic map folds.
+    pub folded: usize,
+    /// Edges whose weight was changed.
+    pub edges_changed: usize,
+    /// `harmonic`, `m_matrix` or `mean_value`.
+    pub method: String,
+}
+
+/// The harmonic quadratic map of a chart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quadratic {
+    /// Invalid triangles.
+    pub invalid: usize,
+    /// Least jacobian determinant per unit of mollified area.
+    pub det_min: f64,
+}
+
+/// The untangling of a chart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Untangle {
+    /// `none` (the harmonic map was valid), `patch`, `feasible` or `start`.
+    pub method: String,
+    /// Newton steps.
+    pub iterations: usize,
+    /// Nodes whose place differs from the harmonic one.
+    pub nodes_moved: usize,
+    /// Dirichlet energy of the harmonic map: a lower bound.
+    pub energy_harmonic: f64,
+    /// Dirichlet energy of the raised linear map.
+    pub energy_start: f64,
+    /// Dirichlet energy of the result.
+    pub energy: f64,
+    /// (energy - energy_harmonic) / energy_harmonic.
+    pub energy_excess: f64,
+    /// Norm of the last barrier problem's gradient, in its inverse Hessian, relative to the root of twice the energy.
+    pub gradient_norm: f64,
+    /// Least jacobian determinant per unit of mollified area, of the result.
+    pub det_min: f64,
+}
+
+/// The proof of a chart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// Always true in a published map.
+    pub proven: bool,
+    /// Triangles proven by the signs of their Bernstein coefficients.
+    pub by_bounds: usize,
+    /// Triangles proven by strict copositivity.
+    pub by_exact: usize,
+    /// Depth of subdivision behind the lower bound.
+    pub depth: u32,
+    /// Lower bound of the jacobian determinant on the reference triangle.
+    pub det_lower_bound: f64,
+    /// How the boundary was proven: arcs of the outer loop and of each hole, all star-shaped.
+    pub boundary: Boundary,
+    /// A point in each hole from which its loop can be seen.
+    pub hole_centres: Vec<[f64; 2]>,
+    /// blake3 over connectivity and uv, see docs/report.md.
+    pub checksum: String,
+}
+
+/// The boundary argument of a proof.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Boundary {
+    /// `star_shaped`.
+    pub argument: String,
+    /// Arcs of the outer loop.
+    pub outer_arcs: usize,
+    /// Holes.
+    pub holes: usize,
+}
+
+/// The distortion of a chart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Distortion {
+    /// Median of sigma1 / sigma2, by area.
+    pub conformal_median: f64,
+    /// 99 % quantile of sigma1 / sigma2, by area.
+    pub conformal_p99: f64,
+    /// 99.9 % over 0.1 % quantile of the area scale of two-ring stars, by area.
+    pub area_ratio: f64,
+}
+
+/// The curves between charts.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Seams {
+    /// How many.
+    pub curves: usize,
+    /// Points where they meet.
+    pub corners: usize,
+    /// Their total length.
+    pub length_total: f64,
+    /// The longest one.
+    pub length_max: f64,
+}
+
+/// A file of the result.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Output {
+    /// Its name.
+    pub file: String,
+    /// Its size.
+    pub bytes: u64,
+    /// The hash of its content.
+    pub blake3: String,
+}
+
+impl Output {
+    /// The entry for a file with this content.
+    pub fn of(file: &str, content: &[u8]) -> Self {
+        Self { file: file.to_owned(), bytes: content.len() as u64, blake3: blake3::hash(content).to_hex().to_string() }
+    }
+}
+
+impl Report {
+    /// The report of an input about which nothing is known yet.
+    pub fn new(input: Input, settings: &Settings) -> Self {
+        Self {
+            schema: SCHEMA,
+            planish: env!("CARGO_PKG_VERSION").to_owned(),
+            input,
+            settings: settings.into(),
+            status: Status::Failed,
+            reason: None,
+            surface: None,
+            refused_components: vec![],
+            repairs: None,
+            charts: vec![],
+            seams: Seams::default(),
+            outputs: vec![],
+            timing: BTreeMap::new(),
+        }
+    }
+
+    /// The report as it is written.
+    ///
+    /// # Errors
+    /// Never for reports of planish's own; the signature is that of the library.
+    pub fn to_json(&self) -> serde_json::Result<Vec<u8>> {
+        let mut bytes = serde_json::to_vec_pretty(self)?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+}

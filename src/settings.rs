@@ -1,0 +1,164 @@
+//! Settings: what the user may say, typed and checked in one place.
+
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The order of the elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Order {
+    /// 1
+    Linear,
+    /// 2
+    #[default]
+    Quadratic,
+}
+
+/// The form of log messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Log {
+    /// For people.
+    #[default]
+    Text,
+    /// One JSON object per line.
+    Json,
+}
+
+/// What was said, on the command line or in planish.toml; the same names in both.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Said {
+    /// Folder for the results.
+    pub out: Option<PathBuf>,
+    /// Order of the elements: 1 or 2.
+    pub order: Option<u8>,
+    /// Tolerance for cracks, relative to the diagonal of the bounding box.
+    pub weld: Option<f64>,
+    /// Process inputs whose output is up to date, too.
+    pub force: Option<bool>,
+    /// Form of log messages.
+    pub log: Option<Log>,
+    /// How much more to log: 1 informs, 2 explains, 3 traces.
+    pub verbose: Option<u8>,
+    /// Print nothing but errors.
+    pub quiet: Option<bool>,
+}
+
+/// Checked settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Folder for the results; verbs that write none need none.
+    pub out: Option<PathBuf>,
+    /// Order of the elements.
+    pub order: Order,
+    /// Tolerance for cracks, relative to the diagonal of the bounding box.
+    pub weld: f64,
+    /// Process inputs whose output is up to date, too.
+    pub force: bool,
+    /// Form of log messages.
+    pub log: Log,
+    /// 0 warns, 1 informs, 2 explains, 3 traces.
+    pub verbose: u8,
+    /// Print nothing but errors.
+    pub quiet: bool,
+}
+
+/// Why settings are refused: wrong usage.
+#[derive(Debug, thiserror::Error)]
+pub enum SettingsError {
+    /// The order is not 1 or 2.
+    #[error("order is {0}; it must be 1 (linear) or 2 (quadratic)")]
+    Order(u8),
+    /// The tolerance is out of range.
+    #[error("weld is {0}; it must lie between 0 (close no cracks) and 0.01 of the bounding box's diagonal")]
+    Weld(f64),
+    /// The file cannot be read.
+    #[error("cannot read the settings file {path}: {error}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        error: std::io::Error,
+    },
+    /// The file makes no sense.
+    #[error("{path}: {error}")]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Where and why.
+        error: Box<toml::de::Error>,
+    },
+}
+
+impl Said {
+    /// Reads planish.toml.
+    ///
+    /// # Errors
+    /// [`SettingsError`] with line and key.
+    pub fn from_file(path: &Path) -> Result<Self, SettingsError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| SettingsError::Unreadable { path: path.to_owned(), error })?;
+        toml::from_str(&text).map_err(|error| SettingsError::Syntax { path: path.to_owned(), error: Box::new(error) })
+    }
+
+    /// What was said here, and where nothing was said, what was said in `other`.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            out: self.out.or(other.out),
+            order: self.order.or(other.order),
+            weld: self.weld.or(other.weld),
+            force: self.force.or(other.force),
+            log: self.log.or(other.log),
+            verbose: self.verbose.or(other.verbose),
+            quiet: self.quiet.or(other.quiet),
+        }
+    }
+
+    /// Checks everything and fills in the defaults.
+    ///
+    /// # Errors
+    /// [`SettingsError`] for values out of range.
+    pub fn check(self) -> Result<Settings, SettingsError> {
+        let order = match self.order.unwrap_or(2) {
+            1 => Order::Linear,
+            2 => Order::Quadratic,
+            other => return Err(SettingsError::Order(other)),
+        };
+        let weld = self.weld.unwrap_or(pipeline::repair::Settings::default().weld);
+        if !(0.0..=0.01).contains(&weld) {
+            return Err(SettingsError::Weld(weld));
+        }
+        Ok(Settings {
+            out: self.out,
+            order,
+            weld,
+            force: self.force.unwrap_or(false),
+            log: self.log.unwrap_or_default(),
+            verbose: self.verbose.unwrap_or(0),
+            quiet: self.quiet.unwrap_or(false),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flags_win_over_the_file_and_the_file_over_defaults() {
+        let file: Said = toml::from_str("order = 1\nweld = 1e-5\nlog = \"json\"").expect("valid");
+        let flags = Said { weld: Some(0.0), ..Said::default() };
+        let settings = flags.or(file).check().expect("in range");
+        assert_eq!((settings.order, settings.weld, settings.log), (Order::Linear, 0.0, Log::Json));
+        assert_eq!(Said::default().check().expect("defaults").weld, 1e-6);
+    }
+
+    #[test]
+    fn wrong_values_are_refused() {
+        assert!(matches!(Said { order: Some(3), ..Said::default() }.check(), Err(SettingsError::Order(3))));
+        for weld in [-1e-9, 0.02, f64::NAN] {
+            assert!(matches!(Said { weld: Some(weld), ..Said::default() }.check(), Err(SettingsError::Weld(_))));
+        }
+        assert!(toml::from_str::<Said>("oder = 1").is_err(), "unknown keys are errors");
+    }
+}
