@@ -23,8 +23,8 @@ fn needs_decomposition(c: &Census) -> String {
     let kind = if c.orientable { "orientable" } else { "not orientable" };
     format!(
         "the surface is not one disk (with or without holes): {} components, {genus}, {} boundary loops, {kind}, \
-         {} non-manifold edges; cut it into such pieces, one file each",
-        c.components, c.boundary_loops, c.nonmanifold_edges
+         {} non-manifold edges, {} non-manifold vertices; cut it into such pieces, one file each",
+        c.components, c.boundary_loops, c.nonmanifold_edges, c.nonmanifold_vertices
     )
 }
 

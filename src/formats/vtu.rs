@@ -121,7 +121,7 @@ fn encode(
     };
     let library = |e: &dyn std::fmt::Display| VtuError::Library(e.to_string());
     let mut bytes = Vec::new();
-    let file = vtk.try_into_xml_format(Compressor::ZLib, 1).map_err(|e| library(&e))?;
+    let file = vtk.try_into_xml_format(Compressor::LZ4, 1).map_err(|e| library(&e))?;
     file.write(&mut bytes).map_err(|e| library(&e))?;
     Ok(bytes)
 }

@@ -148,7 +148,8 @@ impl Census {
 
     /// Whether the surface is a disk, or a disk with holes: what one chart can carry.
     pub fn is_one_chart(&self) -> bool {
-        self.components == 1 && self.genus == Some(0) && self.boundary_loops > 0 && self.nonmanifold_edges == 0
+        let manifold = self.nonmanifold_edges == 0 && self.nonmanifold_vertices == 0;
+        manifold && self.components == 1 && self.genus == Some(0) && self.boundary_loops > 0
     }
 }
 

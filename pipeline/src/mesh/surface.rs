@@ -5,7 +5,8 @@ use crate::id::VertexId;
 use crate::space::{BoundingBox, Vec3, triangle_area};
 
 /// A triangulated surface after repair: no triangle repeats a vertex or another triangle, orientable components
-/// are oriented, and sheets that only touched in a vertex have vertices of their own. Made by [`crate::repair`].
+/// are oriented, and every sheet that met others at non-manifold edges or vertices has vertices of its own. Made by
+/// [`crate::repair`].
 #[derive(Clone, Debug)]
 pub struct SurfaceMesh {
     pub(crate) points: Vec<Vec3>,
@@ -44,7 +45,8 @@ impl SurfaceMesh {
         &self.edges
     }
 
-    /// The counts.
+    /// The counts after splitting; but `nonmanifold_edges` are those that were split, and `nonmanifold_vertices`
+    /// those at which a sheet touches others away from its boundary.
     pub fn census(&self) -> &Census {
         &self.census
     }

@@ -4,11 +4,13 @@
 //! 2. Triangles with two equal vertices, and copies of a triangle, are dropped. Slivers stay.
 //! 3. Cracks are closed: open edges that run side by side within a tolerance (see [`Settings::weld`]).
 //! 4. Every orientable component is oriented like the majority of its triangles.
-//! 5. Sheets that only touch in a vertex get vertices of their own.
+//! 5. The surface is split along non-manifold edges, and where sheets only touch in a vertex: every sheet gets
+//!    vertices of its own.
 //! 6. Edge lengths are mollified where triangles are degenerate ([`crate::mesh::Metric`]).
 //!
-//! Everything that was found and done is counted, with the first few ids. Non-manifold edges are left as they
-//! are, and counted. What cannot be a surface at all (no triangle is left) is refused.
+//! Everything that was found and done is counted, with the first few ids. The census of the result still counts
+//! the non-manifold edges that were split, and the vertices at which a sheet touches others away from its
+//! boundary: both have to become seams. What cannot be a surface at all (no triangle is left) is refused.
 
 mod cracks;
 mod weld;
@@ -214,10 +216,12 @@ impl Draft {
         report.mollified_by = metric.mollified_by / metric.scale;
         report.mollified_triangles =
             Found::of((0..corners.len()).filter(|f| metric.flagged[*f]).map(|f| self.source[f]));
-        // Splitting vertices moves no edge: the table of edges stays as it is, but for non-manifold ones, whose
-        // sides may now end in different copies.
-        let edges = EdgeTable::new(&triangles);
-        let census = Census::new(&triangles, &edges);
+        let split = EdgeTable::new(&triangles);
+        let mut census = Census::new(&triangles, &split);
+        // Splitting makes every sheet manifold; what was split is still told, as it must become a seam.
+        census.nonmanifold_edges = edges.iter().filter(|(_, sides)| sides.len() > 2).count();
+        census.nonmanifold_vertices = pinned_vertices(&welded, &triangles, &split);
+        let edges = split;
         SurfaceMesh { points, triangles, source: self.source, welded, edges, census, metric }
     }
 }
@@ -236,6 +240,18 @@ fn split_vertices(umbrella_vertices: &[VertexId], report: &mut Report) -> (Vec<V
         report.split_vertices.push(copies[0].0.0);
     }
     (of_umbrella, welded)
+}
+
+/// Vertices at which sheets touch, one of them not at its boundary: no boundary loop passes through them there.
+fn pinned_vertices(welded: &[u32], triangles: &[[VertexId; 3]], edges: &EdgeTable) -> usize {
+    let mut on_boundary = vec![false; welded.len()];
+    for h in open_half_edges(edges, triangles.len()) {
+        on_boundary[triangles[h.face().index()][h.side()].index()] = true;
+        on_boundary[triangles[h.face().index()][h.next().side()].index()] = true;
+    }
+    let copies = welded.iter().zip(&on_boundary).collect::<Vec<_>>();
+    let pinned = |sheets: &&[(&u32, &bool)]| sheets.len() > 1 && sheets.iter().any(|s| !s.1);
+    copies.chunk_by(|a, b| a.0 == b.0).filter(pinned).count()
 }
 
 /// The half-edges along open edges, ascending.

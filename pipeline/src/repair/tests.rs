@@ -101,3 +101,26 @@ fn repair_does_not_depend_on_units() {
         assert!(got.report.cracks_closed > 0 && got.mesh.census().is_one_chart(), "scale {scale}");
     }
 }
+
+#[test]
+fn sheets_are_split_along_non_manifold_edges_which_are_still_told() {
+    let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
+    let soup = TriangleSoup::new(points, vec![[0, 1, 2], [1, 0, 3], [0, 1, 4]]).expect("sound");
+    let got = repaired(&soup);
+    let census = got.mesh.census();
+    assert_eq!((census.nonmanifold_edges, census.components, got.report.split_vertices.count), (1, 3, 2));
+    assert!(!census.is_one_chart());
+}
+
+#[test]
+fn a_vertex_pinned_to_the_inside_of_a_sheet_is_told() {
+    // A disk and a triangle that stands on its middle.
+    let disk = shapes::flat_disk(1);
+    let mut points = disk.points().to_vec();
+    points.extend([[0.1, 0.0, 1.0], [-0.1, 0.0, 1.0]]);
+    let mut triangles = disk.triangles().to_vec();
+    triangles.push([0, 7, 8]);
+    let got = repaired(&TriangleSoup::new(points, triangles).expect("sound"));
+    assert_eq!((got.mesh.census().nonmanifold_vertices, got.mesh.census().components), (1, 2));
+    assert_eq!(repaired(&shapes::bow_tie()).mesh.census().nonmanifold_vertices, 0, "both sheets at their boundary");
+}

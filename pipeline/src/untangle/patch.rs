@@ -21,6 +21,9 @@ const LARGEST: f64 = 0.5;
 /// Weight of the regularised penalty, relative to the area of each triangle in the plane.
 const PULL: f64 = 3e-2;
 
+/// The least width of the regularised penalty, relative to a typical jacobian.
+const NARROWEST: f64 = 1e-4;
+
 /// Changes of the regularised penalty's width, and Newton steps for each.
 const ROUNDS: usize = 25;
 const STEPS_PER_ROUND: usize = 4;
@@ -153,11 +156,15 @@ fn relax(problem: &mut Problem, x: &mut Places, effort: &mut Effort) -> Result<(
     let analysis = pattern.analyse()?;
     problem.scale_weights(PULL);
     let mut least = problem.least(x);
+    let mut eps = f64::INFINITY;
     for _ in 0..ROUNDS {
         if least > 0.0 {
             break;
         }
-        let penalty = Penalty::Regularised { eps: (-0.2 * least).max(1e-3) };
+        // Never wider than the worst jacobian asks for, and narrower from round to round: a penalty that is too
+        // wide comes to rest against the energy while triangles are still inverted.
+        eps = (0.6 * eps).min(-0.2 * least).max(NARROWEST);
+        let penalty = Penalty::Regularised { eps };
         effort.add(minimise(problem, (&pattern, &analysis), x, penalty, (STEPS_PER_ROUND, TOLERANCE))?);
         least = problem.least(x);
     }
