@@ -1,0 +1,155 @@
+//! `planish check`: it proves what is right and finds what was tampered with, even behind new checksums.
+
+use crate::support::{Ended, Out, fixture, planish};
+use pipeline::certify::PlanarMap;
+use pipeline::grid::GridPoint;
+use planish::formats::vtu;
+use planish::report::{Output, Report, chart_checksum};
+use vtkio::model::{Attribute, DataSet, IOBuffer, Piece, UnstructuredGridPiece, Vtk};
+use vtkio::xml::Compressor;
+
+fn certified(name: &str) -> Out {
+    let out = Out::new();
+    assert_eq!(out.run(&[&fixture(name)], &["-q"]).code, Some(0));
+    out
+}
+
+fn check(out: &Out, name: &str) -> Ended {
+    planish(["check".as_ref(), out.of(name).as_os_str()])
+}
+
+/// Rewrites a file of a result with its grid changed.
+fn rewrite(out: &Out, name: &str, file: &str, change: impl Fn(&mut UnstructuredGridPiece)) {
+    let mut vtk = Vtk::parse_xml(&out.read(name, file)[..]).expect("readable");
+    let DataSet::UnstructuredGrid { pieces, .. } = &mut vtk.data else { panic!("a grid") };
+    let Piece::Inline(piece) = &mut pieces[0] else { panic!("inline") };
+    change(piece);
+    let mut bytes = Vec::new();
+    vtk.try_into_xml_format(Compressor::LZ4, 1).expect("writable").write(&mut bytes).expect("written");
+    std::fs::write(out.of(name).join(file), bytes).expect("written");
+}
+
+fn doubles<'a>(attributes: &'a mut [Attribute], wanted: &str) -> &'a mut Vec<f64> {
+    attributes
+        .iter_mut()
+        .find_map(|a| match a {
+            Attribute::DataArray(d) if d.name == wanted => match &mut d.data {
+                IOBuffer::F64(v) => Some(v),
+                _ => None,
+            },
+            _ => None,
+        })
+        .expect("the field")
+}
+
+/// Makes every checksum of a result anew, as a careful forger would.
+fn forge_checksums(out: &Out, name: &str) {
+    let mut report: Report = out.report(name);
+    let grid = vtu::read(&out.read(name, "surface.vtu")).expect("readable");
+    let nodes = grid.uv.iter().map(|uv| GridPoint::exact(*uv).unwrap_or_default()).collect();
+    let map = PlanarMap { cells: grid.cells, nodes, hole_centres: vec![] };
+    report.charts[0].certificate.checksum = chart_checksum(&map);
+    for output in &mut report.outputs {
+        *output = Output::of(&output.file, &out.read(name, &output.file));
+    }
+    std::fs::write(out.of(name).join("report.json"), report.to_json().expect("JSON")).expect("written");
+}
+
+#[test]
+fn a_folded_triangle_is_named_even_behind_new_checksums() {
+    let name = "disk_with_holes.stl";
+    for fold in [17, 300, 571] {
+        let out = certified(name);
+        let cell = vtu::read(&out.read(name, "surface.vtu")).expect("readable").cells[fold];
+        // The middle of edge 01 moves onto that of edge 20: the triangle folds.
+        let change = |piece: &mut UnstructuredGridPiece| {
+            let uv = doubles(&mut piece.data.point, "uv");
+            let (from, to) = (cell[5] as usize, cell[3] as usize);
+            uv.copy_within(2 * from..2 * from + 2, 2 * to);
+        };
+        rewrite(&out, name, "surface.vtu", change);
+        rewrite(&out, name, "param.vtu", change);
+        forge_checksums(&out, name);
+        let ended = check(&out, name);
+        assert_eq!(ended.code, Some(1));
+        let named = ended.err.lines().find(|l| l.contains("are invalid")).expect("triangles are named");
+        let ids: Vec<&str> = named.split([' ', ',', ':']).collect();
+        assert!(ids.contains(&fold.to_string().as_str()), "{fold}: {named}");
+        assert!(!ended.err.contains("blake3"), "the checksums were made anew: {}", ended.err);
+    }
+}
+
+#[test]
+fn a_moved_point_of_a_hole_or_a_crack_is_found_behind_new_checksums() {
+    let name = "disk_with_holes.stl";
+    let out = certified(name);
+    let mut report = out.report(name);
+    report.charts[0].certificate.hole_centres[1] = [0.9, 0.0];
+    std::fs::write(out.of(name).join("report.json"), report.to_json().expect("JSON")).expect("written");
+    let ended = check(&out, name);
+    assert!(ended.code == Some(1) && ended.err.contains("star-shaped"), "{}", ended.err);
+
+    let out = certified(name);
+    let crack = |piece: &mut UnstructuredGridPiece| {
+        let vtkio::model::VertexNumbers::XML { connectivity, .. } = &mut piece.cells.cell_verts else { panic!() };
+        // One triangle turns round: its edges no longer run against those of its neighbours.
+        connectivity.swap(6 * 100 + 1, 6 * 100 + 2);
+        connectivity.swap(6 * 100 + 3, 6 * 100 + 5);
+    };
+    rewrite(&out, name, "surface.vtu", crack);
+    rewrite(&out, name, "param.vtu", crack);
+    forge_checksums(&out, name);
+    let ended = check(&out, name);
+    assert!(ended.code == Some(1) && ended.err.contains("oriented surface"), "{}", ended.err);
+}
+
+#[test]
+fn param_must_show_the_same_map() {
+    let name = "disk.stl";
+    let out = certified(name);
+    rewrite(&out, name, "param.vtu", |piece| {
+        let IOBuffer::F64(points) = &mut piece.points else { panic!("doubles") };
+        points[3 * 40] += 1e-3;
+    });
+    forge_checksums(&out, name);
+    let ended = check(&out, name);
+    assert!(ended.code == Some(1) && ended.err.contains("param.vtu"), "{}", ended.err);
+}
+
+#[test]
+fn any_changed_byte_is_found_with_the_name_of_its_file() {
+    let name = "floater_five.obj";
+    let out = certified(name);
+    for output in out.report(name).outputs {
+        let path = out.of(name).join(&output.file);
+        let whole = std::fs::read(&path).expect("there");
+        // Every 37th byte (and the last one), by one bit, and the file cut short.
+        let places = (0..whole.len()).step_by(37).chain([whole.len() - 1]);
+        let broken = places.map(|i| {
+            let mut bytes = whole.clone();
+            bytes[i] ^= 1 << (i % 8);
+            bytes
+        });
+        for bytes in broken.chain([whole[..whole.len() / 2].to_vec(), vec![]]) {
+            std::fs::write(&path, bytes).expect("written");
+            let ended = check(&out, name);
+            assert!(ended.code == Some(1) && ended.err.contains(&output.file), "{}: {}", output.file, ended.err);
+        }
+        std::fs::write(&path, whole).expect("written");
+    }
+    assert_eq!(check(&out, name).code, Some(0), "restored");
+}
+
+#[test]
+fn several_results_are_checked_in_one_call() {
+    let out = certified("disk.stl");
+    out.run(&[&fixture("floater_five.obj")], &["-q"]);
+    let report = out.of("disk.stl").join("report.json");
+    let ended = planish(["check".as_ref(), report.as_os_str(), out.of("floater_five.obj").as_os_str()]);
+    assert_eq!((ended.code, ended.out.lines().count()), (Some(0), 2), "{}", ended.err);
+    std::fs::remove_file(out.of("disk.stl").join("surface.vtu")).expect("removed");
+    let ended = planish(["check".as_ref(), report.as_os_str(), out.of("floater_five.obj").as_os_str()]);
+    assert!(ended.code == Some(1) && ended.err.contains("surface.vtu"), "{}", ended.err);
+    assert!(ended.out.contains("floater_five.obj"), "the other one is proven: {}", ended.out);
+    assert_eq!(planish(["check", "no/such/folder"]).code, Some(1));
+}

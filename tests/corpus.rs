@@ -1,0 +1,140 @@
+//! Real files, where they are at hand: scans, terrains, CAD exports, and files that are broken. They lie beside the
+//! repository (`../shared`), are under licences of their own, and are no part of it; without them these tests say
+//! so and pass.
+
+use crate::interop::assert_vtk_agrees;
+use crate::support::{Out, planish, root};
+use planish::outcome::{Code, Status};
+use planish::report::Report;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A folder of real files.
+fn shared(folder: &str) -> Option<PathBuf> {
+    let path = root().parent()?.join("shared").join(folder);
+    if path.is_dir() {
+        return Some(path);
+    }
+    eprintln!("skipped: {} is not at hand", path.display());
+    None
+}
+
+/// The rows of a manifest: file, and its columns by name.
+fn manifest(folder: &Path) -> Vec<BTreeMap<String, String>> {
+    let text = std::fs::read_to_string(folder.join("MANIFEST.tsv")).expect("a manifest");
+    let mut lines = text.lines().map(|l| l.split('\t').map(str::to_owned).collect::<Vec<_>>());
+    let names = lines.next().expect("a header");
+    lines.map(|row| names.iter().cloned().zip(row).collect()).collect()
+}
+
+fn run_all(inputs: &[PathBuf]) -> (Out, Vec<(String, Report)>) {
+    let out = Out::new();
+    let paths: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    out.run(&paths, &["-q"]);
+    let name = |p: &PathBuf| p.file_name().expect("a name").to_string_lossy().into_owned();
+    let reports = inputs.iter().map(name).map(|n| (n.clone(), out.report(&n))).collect();
+    (out, reports)
+}
+
+#[test]
+fn real_disks_are_certified_proven_again_and_opened_by_vtk() {
+    let (Some(meshes), Some(anchors)) = (shared("meshes"), shared("anchors/stl")) else { return };
+    let mut inputs: Vec<PathBuf> =
+        ["face_bff.obj", "mountain.obj", "terrain_gmsh.stl", "beetle_11_holes.obj", "bunny_stanford.stl"]
+            .map(|n| meshes.join(n))
+            .to_vec();
+    inputs.extend(["patch_10k.stl", "patch_10ks.stl", "patch_100k.stl", "patch_100ks.stl"].map(|n| anchors.join(n)));
+    let (out, reports) = run_all(&inputs);
+    for (name, report) in &reports {
+        assert_eq!(report.status, Status::Certified, "{name}: {:?}", report.reason);
+        let chart = &report.charts[0];
+        let repaired = &report.surface.as_ref().expect("a surface").repaired.counts;
+        assert_eq!((chart.triangles, chart.loops), (repaired.triangles, repaired.boundary_loops), "{name}");
+        // The harmonic energy is a lower bound of the certified map's, which stays close to it.
+        let excess = chart.untangle.as_ref().expect("quadratic").energy_excess;
+        assert!((-1e-12..1e-3).contains(&excess), "{name}: {excess}");
+        let checked = planish(["check".as_ref(), out.of(name).as_os_str()]);
+        assert_eq!(checked.code, Some(0), "{name}: {}", checked.err);
+    }
+    let bunny = &reports.iter().find(|r| r.0 == "bunny_stanford.stl").expect("the bunny").1.charts[0];
+    assert!(bunny.distortion.area_ratio > 1e9, "far more than one chart should bear: {:?}", bunny.distortion);
+    let folders: Vec<PathBuf> = reports.iter().map(|(name, _)| out.of(name)).collect();
+    assert_vtk_agrees(&folders);
+}
+
+#[test]
+fn tubes_are_certified_or_refused_as_needing_a_split() {
+    let Some(meshes) = shared("meshes") else { return };
+    let inputs = ["aneurysm_gmsh.stl", "airplane_27_holes.obj", "aorta_open_vmtk.stl"].map(|n| meshes.join(n));
+    let (out, reports) = run_all(&inputs);
+    for (name, report) in reports {
+        match report.status {
+            Status::Certified => {
+                assert_eq!(planish(["check".as_ref(), out.of(&name).as_os_str()]).code, Some(0), "{name}");
+            }
+            _ => assert_eq!(report.reason.expect("a reason").code, Code::NeedsSplit, "{name}"),
+        }
+    }
+}
+
+#[test]
+fn counts_are_those_of_the_manifest() {
+    let Some(meshes) = shared("meshes") else { return };
+    let mut seen = 0;
+    for row in manifest(&meshes) {
+        let path = meshes.join(&row["file"]);
+        if !["stl", "obj"].contains(&path.extension().and_then(|e| e.to_str()).unwrap_or_default()) {
+            continue;
+        }
+        let answer: serde_json::Value =
+            serde_json::from_str(&planish(["info".as_ref(), "--json".as_ref(), path.as_os_str()]).out).expect("JSON");
+        let raw = &answer["surface"]["raw"];
+        for (column, field) in [
+            ("vertices_welded", "vertices"),
+            ("triangles_used", "triangles"),
+            ("components", "components"),
+            ("boundary_loops", "boundary_loops"),
+            ("nonmanifold_edges", "nonmanifold_edges"),
+        ] {
+            let Ok(expected) = row[column].parse::<u64>() else { continue };
+            // Loops of surfaces that are not manifold can be counted in several ways.
+            if row["manifold"] == "yes" || !["boundary_loops", "components"].contains(&field) {
+                assert_eq!(raw[field], expected, "{}: {column}", row["file"]);
+            }
+        }
+        if let (Ok(genus), "yes") = (row["genus_total"].parse::<u64>(), row["manifold"].as_str()) {
+            assert_eq!(raw["genus"], genus, "{}", row["file"]);
+        }
+        seen += 1;
+    }
+    assert!(seen >= 25, "only {seen} files were at hand");
+}
+
+#[test]
+fn a_cracked_part_is_closed_to_its_true_genus() {
+    let Some(meshes) = shared("meshes") else { return };
+    let path = meshes.join("cad_featuretype_cracked.stl");
+    let answer: serde_json::Value =
+        serde_json::from_str(&planish(["info".as_ref(), "--json".as_ref(), path.as_os_str()]).out).expect("JSON");
+    let repaired = &answer["surface"]["repaired"];
+    assert_eq!((&repaired["genus"], &repaired["boundary_loops"]), (&9.into(), &0.into()));
+}
+
+#[test]
+fn broken_files_do_what_the_manifest_says() {
+    let Some(malformed) = shared("malformed") else { return };
+    for row in manifest(&malformed) {
+        let name = &row["file"];
+        let readable = name.ends_with(".stl") || name.ends_with(".obj");
+        let (_, reports) = run_all(&[malformed.join(name)]);
+        let report = &reports[0].1;
+        let reason = report.reason.as_ref();
+        if row["kind"].contains("reject") {
+            let reason = reason.expect("a refusal");
+            let read = [Code::NeedsDecomposition, Code::NeedsSplit, Code::Internal].contains(&reason.code);
+            assert!(report.status == Status::Refused && !read, "{name}: {reason:?}");
+        } else if readable {
+            assert!(report.surface.is_some(), "{name} can be read: {reason:?}");
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! The real VTK opens what planish writes, and an independent program proves the triangles valid again.
+//!
+//! The Python environment is made beside the sources (`.venv`, not under version control) when a test first needs
+//! it, with the packages of requirements.txt.
+
+use crate::support::{Out, fixture, root};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::LazyLock;
+
+/// The interpreter of the environment.
+static PYTHON: LazyLock<PathBuf> = LazyLock::new(|| {
+    let venv = root().join(".venv");
+    let python = venv.join("bin/python");
+    let wanted = std::fs::read_to_string(root().join("tests/interop/requirements.txt")).expect("committed");
+    let stamp = venv.join("planish-requirements");
+    if std::fs::read_to_string(&stamp).is_ok_and(|made| made == wanted) {
+        return python;
+    }
+    let remedy = "python3 with its venv module is needed: apt-get install python3 python3-venv";
+    run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&venv), remedy);
+    let mut pip = Command::new(&python);
+    pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"]);
+    run(
+        pip.arg(root().join("tests/interop/requirements.txt")),
+        "the packages could not be installed: is PyPI reachable?",
+    );
+    std::fs::write(stamp, wanted).expect("written");
+    python
+});
+
+/// Runs a command that must succeed; what it printed.
+fn run(command: &mut Command, remedy: &str) -> String {
+    let Output { status, stdout, stderr } = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}\n{remedy}"));
+    let (out, err) = (String::from_utf8_lossy(&stdout), String::from_utf8_lossy(&stderr));
+    assert!(status.success(), "{command:?} failed\n{out}{err}\n{remedy}");
+    format!("{out}{err}")
+}
+
+fn script(name: &str) -> Command {
+    let mut command = Command::new(&*PYTHON);
+    command.arg(root().join("tests/interop").join(name));
+    command
+}
+
+/// VTK opens both files of a result without a word, finds every field, and every triangle is valid.
+pub fn assert_vtk_agrees(folders: &[PathBuf]) {
+    let printed = run(script("verify_vtu.py").args(folders), "VTK or the independent proof disagrees");
+    assert_eq!(printed.lines().filter(|l| l.starts_with("ok ")).count(), folders.len(), "{printed}");
+}
+
+#[test]
+fn vtk_opens_both_files_and_an_independent_proof_agrees() {
+    let out = Out::new();
+    let names =
+        ["disk.stl", "disk_with_holes.stl", "bent_disk.stl", "folding_three.obj", "sliver_strip.obj", "finger.obj"];
+    let paths: Vec<PathBuf> = names.iter().map(|n| fixture(n)).collect();
+    // Sizes at which arrays fill compression blocks exactly, and one below and above.
+    let squares = tempfile::tempdir().expect("a folder");
+    let blocks: Vec<PathBuf> = [63, 64, 65].iter().map(|n| square_grid(squares.path(), *n)).collect();
+    let inputs: Vec<&Path> = paths.iter().chain(&blocks).map(PathBuf::as_path).collect();
+    assert_eq!(out.run(&inputs, &["-q"]).code, Some(0));
+    let folders: Vec<PathBuf> = inputs.iter().map(|p| out.path().join(p.file_name().expect("a name"))).collect();
+    assert_vtk_agrees(&folders);
+}
+
+/// A bumpy grid of n x n squares as an OBJ file.
+fn square_grid(folder: &Path, n: u32) -> PathBuf {
+    let mut text = String::new();
+    for (i, j) in (0..=n).flat_map(|i| (0..=n).map(move |j| (i, j))) {
+        text += &format!("v {i} {j} {}\n", f64::from((i * 7 + j * 3) % 5) * 0.1);
+    }
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+        let a = i * (n + 1) + j + 1;
+        text += &format!("f {} {} {} {}\n", a, a + n + 1, a + n + 2, a + 1);
+    }
+    let path = folder.join(format!("grid{n}.obj"));
+    std::fs::write(&path, text).expect("written");
+    path
+}
+
+#[test]
+fn a_broken_twin_is_found_by_the_independent_proof() {
+    let out = Out::new();
+    assert_eq!(out.run(&[&fixture("disk.stl")], &["-q"]).code, Some(0));
+    let output = script("verify_vtu.py").arg("--break").arg(out.of("disk.stl")).output().expect("runs");
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(!output.status.success() && printed.contains("invalid triangle"), "{printed}");
+}
+
+#[test]
+fn every_report_follows_the_published_schema() {
+    let out = Out::new();
+    let refused = out.path().join("inputs");
+    std::fs::create_dir(&refused).expect("made");
+    std::fs::write(refused.join("empty.stl"), "").expect("written");
+    std::fs::write(refused.join("flat.obj"), "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n").expect("written");
+    out.run(&[&root().join("fixtures"), &refused], &["-q"]);
+    out.run(&[&fixture("disk.stl")], &["-q", "--order", "1"]);
+    let reports = std::fs::read_dir(out.path()).expect("a folder").flatten().map(|e| e.path().join("report.json"));
+    let reports: Vec<PathBuf> = reports.filter(|p| p.exists()).collect();
+    assert_eq!(reports.len(), 15);
+    let schema = root().join("docs/report.schema.json");
+    run(script("validate_schema.py").arg(schema).args(reports), "a report breaks the schema");
+}

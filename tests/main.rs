@@ -1,0 +1,9 @@
+//! The tests of the program as a whole: they drive the real binary and look at what it wrote, with the real VTK.
+
+mod check;
+mod corpus;
+mod fixtures;
+mod interop;
+mod invariants;
+mod run;
+mod support;

@@ -1,0 +1,183 @@
+//! `planish run` and `planish info`: exit codes, settings, what is skipped, what is refused.
+
+use crate::support::{Out, fixture, planish};
+use planish::outcome::{Code, Status};
+use std::path::Path;
+
+/// A refused input has its report; its place and remedy are told.
+#[test]
+fn refusals_say_where_and_what_to_do() {
+    let binary = std::fs::read(fixture("disk.stl")).expect("a fixture");
+    let mut nan = binary.clone();
+    nan[84 + 50 + 12..84 + 50 + 16].copy_from_slice(&f32::NAN.to_le_bytes());
+    let mut empty = binary[..84].to_vec();
+    empty[80..].fill(0);
+    let cases: [(&str, &[u8], Code, Option<&str>); 11] = [
+        ("empty.stl", b"", Code::EmptyFile, Some("byte 0")),
+        ("zero.stl", &empty, Code::NoTriangles, None),
+        ("cut.stl", &binary[..1000], Code::CountMismatch, Some("byte 80")),
+        ("nan.stl", &nan, Code::NotFinite, Some("byte 134")),
+        ("inf.obj", b"v 0 0 0\nv 1 inf 0\nv 0 1 0\nf 1 2 3\n", Code::NotFinite, Some("line 2")),
+        ("index.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", Code::Malformed, Some("line 4")),
+        ("word.stl", b"solid\nfacet normal 0 0 1\nouter lop\nvertex a 0 0\n", Code::Malformed, Some("line 4")),
+        ("flat.obj", b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", Code::OnlyDegenerate, None),
+        ("part.xyz", b"1 2 3", Code::UnknownExtension, Some("file name")),
+        ("part.ply", b"ply\n", Code::UnsupportedFormat, Some("file name")),
+        ("part.mtl", b"newmtl a\n", Code::NotAMesh, Some("file name")),
+    ];
+    for (name, bytes, code, place) in cases {
+        let out = Out::new();
+        let (ended, report) = out.run_bytes(name, bytes);
+        let reason = report.reason.expect("a reason");
+        assert_eq!((ended.code, report.status, reason.code), (Some(1), Status::Refused, code), "{name}");
+        assert_eq!(reason.place.as_deref(), place, "{name}: {}", reason.message);
+        assert!(ended.err.contains(&reason.message) && ended.err.contains(name), "{}", ended.err);
+        assert_eq!(std::fs::read_dir(out.of(name)).expect("a folder").count(), 1, "nothing but the report");
+        assert!(report.outputs.is_empty());
+    }
+}
+
+#[test]
+fn one_bad_input_does_not_keep_the_others() {
+    let out = Out::new();
+    let ended = out.run(&[Path::new("no/such/file.stl"), &fixture("disk.stl")], &[]);
+    assert_eq!(ended.code, Some(1));
+    assert_eq!(out.report("file.stl").reason.expect("a reason").code, Code::Unreadable);
+    assert_eq!(out.report("disk.stl").status, Status::Certified);
+    assert!(ended.out.contains("disk.stl") && ended.out.contains("certified"), "{}", ended.out);
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2_and_does_nothing() {
+    let out = Out::new();
+    let disk = fixture("disk.stl");
+    let twin = tempfile::tempdir().expect("a folder");
+    let copy = twin.path().join("disk.stl");
+    std::fs::copy(&disk, &copy).expect("copied");
+    assert_eq!(out.run(&[&disk, &copy], &[]).code, Some(2), "two inputs of the same name");
+    for extra in [["--order", "3"], ["--weld", "0.5"], ["--weld", "nan"], ["--config", "no/such.toml"]] {
+        assert_eq!(out.run(&[&disk], &extra).code, Some(2), "{extra:?}");
+    }
+    assert_eq!(out.run(&[&disk], &["--no-such-option"]).code, Some(2));
+    assert_eq!(planish(["run".as_ref(), disk.as_os_str()]).code, Some(2), "no output folder");
+    assert_eq!(planish(["run", "--out", "x"]).code, Some(2), "no input");
+    let empty = tempfile::tempdir().expect("a folder");
+    assert_eq!(out.run(&[empty.path()], &[]).code, Some(2), "a folder without meshes");
+    assert_eq!(std::fs::read_dir(out.path()).expect("a folder").count(), 0, "nothing was written");
+}
+
+#[test]
+fn what_is_up_to_date_is_skipped_unless_forced_or_changed() {
+    let out = Out::new();
+    let disk = fixture("disk.stl");
+    assert_eq!(out.run(&[&disk], &[]).code, Some(0));
+    let report = out.of("disk.stl").join("report.json");
+    let written = || std::fs::metadata(&report).and_then(|m| m.modified()).expect("a time");
+    let first = written();
+    let again = out.run(&[&disk], &[]);
+    assert_eq!((again.code, written()), (Some(0), first));
+    assert!(again.out.contains("up to date"), "{}", again.out);
+    out.run(&[&disk], &["--force"]);
+    let forced = written();
+    assert!(forced > first);
+    out.run(&[&disk], &["--order", "1"]);
+    let linear = written();
+    assert!(linear > forced, "other settings");
+    std::fs::remove_file(out.of("disk.stl").join("param.vtu")).expect("removed");
+    out.run(&[&disk], &["--order", "1"]);
+    assert!(written() > linear, "a file is missing");
+    // A refusal is remembered, too, with its exit code.
+    assert_eq!(out.run(&[&fixture("sphere.stl")], &[]).code, Some(1));
+    let again = out.run(&[&fixture("sphere.stl")], &[]);
+    assert_eq!(again.code, Some(1));
+    assert!(again.out.contains("refused (up to date)"), "{}", again.out);
+}
+
+#[test]
+fn results_are_the_same_bytes_every_time() {
+    let (first, second) = (Out::new(), Out::new());
+    for name in ["bent_disk.stl", "disk_with_holes.stl", "sphere.stl"] {
+        first.run(&[&fixture(name)], &[]);
+        second.run(&[&fixture(name)], &["-vv", "--log", "json", "--force"]);
+        assert_eq!(first.timeless(name), second.timeless(name));
+        for output in first.report(name).outputs {
+            assert!(first.read(name, &output.file) == second.read(name, &output.file), "{name}/{}", output.file);
+        }
+    }
+}
+
+#[test]
+fn order_1_writes_the_same_files_with_straight_triangles() {
+    let out = Out::new();
+    assert_eq!(out.run(&[&fixture("disk_with_holes.stl")], &["--order", "1"]).code, Some(0));
+    let report = out.report("disk_with_holes.stl");
+    let files: Vec<_> = report.outputs.iter().map(|o| o.file.as_str()).collect();
+    assert_eq!((files, report.settings.order), (vec!["surface.vtu", "param.vtu"], 1));
+    let chart = &report.charts[0];
+    assert_eq!((&chart.quadratic, &chart.untangle, chart.certificate.by_exact), (&None, &None, 0));
+    let grid = planish::formats::vtu::read(&out.read("disk_with_holes.stl", "surface.vtu")).expect("readable");
+    for cell in &grid.cells {
+        for k in 0..3 {
+            let [a, m, b] = [cell[k], cell[3 + k], cell[(k + 1) % 3]].map(|n| grid.uv[n as usize]);
+            assert_eq!([2.0 * m[0], 2.0 * m[1]], [a[0] + b[0], a[1] + b[1]], "mid nodes lie on chords, exactly");
+        }
+    }
+    assert_eq!(planish(["check".as_ref(), out.of("disk_with_holes.stl").as_os_str()]).code, Some(0));
+}
+
+#[test]
+fn the_settings_file_is_read_and_options_win() {
+    let (out, folder) = (Out::new(), tempfile::tempdir().expect("a folder"));
+    let config = folder.path().join("planish.toml");
+    let text = format!("out = {:?}\norder = 1\nquiet = true\n", out.path());
+    std::fs::write(&config, text).expect("written");
+    let disk = fixture("disk.stl");
+    let args = |extra: &[&str]| {
+        let mut all =
+            vec!["run".to_owned(), disk.display().to_string(), "--config".to_owned(), config.display().to_string()];
+        all.extend(extra.iter().map(ToString::to_string));
+        all
+    };
+    let ended = planish(args(&[]));
+    assert_eq!((ended.code, ended.out.as_str(), ended.err.as_str()), (Some(0), "", ""), "quiet");
+    assert_eq!(out.report("disk.stl").settings.order, 1);
+    assert_eq!(planish(args(&["--order", "2"])).code, Some(0));
+    assert_eq!(out.report("disk.stl").settings.order, 2);
+    std::fs::write(&config, "ordre = 1\n").expect("written");
+    let ended = planish(args(&[]));
+    assert!(ended.code == Some(2) && ended.err.contains("ordre"), "{}", ended.err);
+}
+
+#[test]
+fn weld_decides_about_cracks() {
+    let out = Out::new();
+    assert_eq!(out.run(&[&fixture("cracked_patch.obj")], &[]).code, Some(0));
+    assert_eq!(out.report("cracked_patch.obj").repairs.expect("repairs").cracks_closed, 8);
+    assert_eq!(out.run(&[&fixture("cracked_patch.obj")], &["--weld", "0"]).code, Some(1));
+    let surface = out.report("cracked_patch.obj").surface.expect("a surface");
+    assert_eq!(surface.repaired.counts.components, 2);
+}
+
+#[test]
+fn logs_are_lines_of_json_when_asked_for() {
+    let out = Out::new();
+    let ended = out.run(&[&fixture("disk.stl")], &["-v", "--log", "json"]);
+    let lines: Vec<serde_json::Value> =
+        ended.err.lines().map(|l| serde_json::from_str(l).expect("a JSON object per line")).collect();
+    let said = |what: &str| lines.iter().any(|l| l["fields"]["message"] == what && l["span"]["input"] == "disk.stl");
+    assert!(said("begins") && said("ends"), "{}", ended.err);
+    assert_eq!(out.run(&[&fixture("disk.stl")], &["--force"]).err, "", "silent without -v");
+}
+
+#[test]
+fn info_tells_raw_and_repaired_counts() {
+    let ended = planish(["info".as_ref(), "--json".as_ref(), fixture("cracked_patch.obj").as_os_str()]);
+    let answer: serde_json::Value = serde_json::from_str(&ended.out).expect("JSON");
+    assert_eq!(answer["surface"]["raw"]["components"], 2);
+    assert_eq!(answer["surface"]["repaired"]["components"], 1);
+    assert_eq!(answer["repairs"]["cracks_closed"], 8);
+    let text = planish(["info".as_ref(), fixture("plate_genus9.stl").as_os_str()]);
+    assert!(text.code == Some(0) && text.out.contains("genus 9"), "{}", text.out);
+    let refused = planish(["info", "no/such/file.stl"]);
+    assert!(refused.code == Some(1) && refused.out.contains("unreadable"), "{}", refused.out);
+}
