@@ -22,7 +22,7 @@ fn shuffled(soup: &TriangleSoup) -> TriangleSoup {
     let step = (0..).map(|k| n / 2 + 1 + k).find(|s| gcd(*s, n) == 1).unwrap_or(1);
     let turned = |i: usize| {
         let [a, b, c] = soup.triangles()[i * step % n];
-        if i % 2 == 0 { [b, c, a] } else { [c, a, b] }
+        if i.is_multiple_of(2) { [b, c, a] } else { [c, a, b] }
     };
     TriangleSoup::new(soup.points().to_vec(), (0..n).map(turned).collect()).expect("sound")
 }

@@ -4,7 +4,7 @@ use crate::id::{ChartId, FaceId, HalfEdgeId, VertexId};
 use crate::mesh::{EdgeTable, TriangleShape};
 
 /// A connected, oriented part of a surface of genus 0 whose boundary loops are simple and share no vertex.
-/// Made by [`crate::decompose`].
+/// Made by [`crate::decompose()`].
 #[derive(Clone, Debug)]
 pub struct Chart {
     pub(crate) id: ChartId,

@@ -67,18 +67,28 @@ impl Boundary {
     /// # Errors
     /// [`Error::Count`].
     pub fn prescribed(chart: &ClosedChart, points: &[[f64; 2]], mids: Mids) -> Result<Self, Error> {
-        let (given, needed) = (points.len(), chart.outer().len());
-        if given != needed {
-            return Err(Error::Count { given, needed });
-        }
-        let vertices = points.iter().map(|p| GridPoint::vertex(*p)).collect();
         let bisector = |i: usize| {
-            let (p, q) = (points[i], points[(i + 1) % given]);
+            let (p, q) = (points[i], points[(i + 1) % points.len()]);
             let sum = [p[0] + q[0], p[1] + q[1]];
             let length = sum[0].hypot(sum[1]);
-            GridPoint::mid(sum.map(|c| c / length))
+            sum.map(|c| c / length)
         };
-        Ok(Self { vertices, mids: (0..given).map(bisector).collect() }.with_mids(mids))
+        let middle: Vec<[f64; 2]> = (0..points.len()).map(bisector).collect();
+        Ok(Self::through(chart, points, &middle)?.with_mids(mids))
+    }
+
+    /// The loop on prescribed places of its vertices and of its mid-edge nodes, both in the order of
+    /// [`ClosedChart::outer`].
+    ///
+    /// # Errors
+    /// [`Error::Count`].
+    pub fn through(chart: &ClosedChart, vertices: &[[f64; 2]], mids: &[[f64; 2]]) -> Result<Self, Error> {
+        let needed = chart.outer().len();
+        if let Some(given) = [vertices.len(), mids.len()].into_iter().find(|n| *n != needed) {
+            return Err(Error::Count { given, needed });
+        }
+        let vertices = vertices.iter().map(|p| GridPoint::vertex(*p)).collect();
+        Ok(Self { vertices, mids: mids.iter().map(|p| GridPoint::mid(*p)).collect() })
     }
 
     /// The places of the loop's vertices.

@@ -2,8 +2,8 @@
 //!
 //! The story, in stage order:
 //!
-//! 1. [`repair`] turns a soup into a [`mesh::SurfaceMesh`]: welded, oriented, with mollified edge lengths.
-//! 2. [`decompose`] cuts the surface into [`atlas::Chart`]s: parts that a disk, perhaps with holes, can carry.
+//! 1. [`repair()`] turns a soup into a [`mesh::SurfaceMesh`]: welded, oriented, with mollified edge lengths.
+//! 2. [`decompose()`] cuts the surface into [`atlas::Chart`]s: parts that a disk, perhaps with holes, can carry.
 //! 3. [`map_chart`] makes the [`linear`] map, which does not fold, and the harmonic [`quadratic`] map, whose curved
 //!    triangles may be invalid.
 //! 4. [`finish_chart`] makes them valid ([`mod@untangle`]) while keeping the Dirichlet energy as low as it can be, and
@@ -19,7 +19,7 @@
 //!
 //! # What is not
 //!
-//! Surfaces that are not one disk (with or without holes) are refused by [`decompose`]. The map is a local
+//! Surfaces that are not one disk (with or without holes) are refused by [`decompose()`]. The map is a local
 //! minimiser of the energy, within the maps whose jacobians have positive Bernstein coefficients.
 //!
 //! The method is that of *Surface reparametrization using quadratic finite elements* (Beaufort and co-workers),

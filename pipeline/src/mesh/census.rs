@@ -83,20 +83,25 @@ pub(crate) fn opposed(triangles: &[[VertexId; 3]], g: HalfEdgeId, h: HalfEdgeId)
 pub(crate) struct Orientation {
     pub flip: Vec<bool>,
     pub component: Vec<u32>,
-    pub orientable: bool,
+    /// Per component, whether it can be oriented at all.
+    pub orientable: Vec<bool>,
 }
 
 pub(crate) fn orientation(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Orientation {
     let unseen = u32::MAX;
-    let mut found =
-        Orientation { flip: vec![false; triangles.len()], component: vec![unseen; triangles.len()], orientable: true };
+    let mut found = Orientation {
+        flip: vec![false; triangles.len()],
+        component: vec![unseen; triangles.len()],
+        orientable: vec![],
+    };
     let mut stack = Vec::new();
-    let mut components = 0;
     for seed in 0..triangles.len() {
         if found.component[seed] != unseen {
             continue;
         }
-        found.component[seed] = components;
+        let component = found.orientable.len() as u32;
+        found.component[seed] = component;
+        found.orientable.push(true);
         stack.push(FaceId::at(seed));
         while let Some(face) = stack.pop() {
             for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
@@ -104,15 +109,14 @@ pub(crate) fn orientation(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Ori
                 let flip = found.flip[face.index()] ^ !opposed(triangles, h, twin);
                 let other = twin.face().index();
                 if found.component[other] == unseen {
-                    found.component[other] = components;
+                    found.component[other] = component;
                     found.flip[other] = flip;
                     stack.push(twin.face());
                 } else {
-                    found.orientable &= found.flip[other] == flip;
+                    found.orientable[component as usize] &= found.flip[other] == flip;
                 }
             }
         }
-        components += 1;
     }
     found
 }
@@ -122,7 +126,7 @@ impl Census {
     pub fn new(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Self {
         let umbrellas = Umbrellas::new(triangles, edges);
         let (vertices, nonmanifold_vertices) = count_vertices(&umbrellas.vertices(triangles));
-        let orientable = orientation(triangles, edges).orientable;
+        let orientable = orientation(triangles, edges).orientable.iter().all(|o| *o);
         let nonmanifold_edges = edges.iter().filter(|(_, s)| s.len() > 2).count();
         let inconsistent = |s: &[HalfEdgeId]| matches!(*s, [g, h] if !opposed(triangles, g, h));
         let components = count_components(triangles.len(), edges);

@@ -6,7 +6,7 @@ use crate::space::{BoundingBox, Vec3, triangle_area};
 
 /// A triangulated surface after repair: no triangle repeats a vertex or another triangle, orientable components
 /// are oriented, and every sheet that met others at non-manifold edges or vertices has vertices of its own. Made by
-/// [`crate::repair`].
+/// [`crate::repair()`].
 #[derive(Clone, Debug)]
 pub struct SurfaceMesh {
     pub(crate) points: Vec<Vec3>,

@@ -185,13 +185,12 @@ impl Draft {
     /// Orients each orientable component like the majority of its triangles (the first one, in a tie).
     fn orient(&mut self, edges: &EdgeTable) -> Found {
         let found = crate::mesh::orientation(&self.triangles, edges);
-        let components = found.component.iter().max().map_or(0, |c| *c as usize + 1);
-        let mut balance = vec![0_i64; components];
+        let mut balance = vec![0_i64; found.orientable.len()];
         for (c, flip) in found.component.iter().zip(&found.flip) {
             balance[*c as usize] += if *flip { -1 } else { 1 };
         }
-        let first_of_all = found.flip.iter().zip(&found.component);
-        let turned = first_of_all.map(|(flip, c)| *flip != (balance[*c as usize] < 0));
+        let turn = |(flip, c): (&bool, &u32)| found.orientable[*c as usize] && *flip != (balance[*c as usize] < 0);
+        let turned = found.flip.iter().zip(&found.component).map(turn);
         let mut flipped = Found::default();
         for (face, turn) in turned.enumerate() {
             if turn {

@@ -124,3 +124,9 @@ fn a_vertex_pinned_to_the_inside_of_a_sheet_is_told() {
     assert_eq!((got.mesh.census().nonmanifold_vertices, got.mesh.census().components), (1, 2));
     assert_eq!(repaired(&shapes::bow_tie()).mesh.census().nonmanifold_vertices, 0, "both sheets at their boundary");
 }
+
+#[test]
+fn what_cannot_be_oriented_is_left_as_it_is() {
+    let got = repaired(&shapes::moebius(9));
+    assert_eq!((got.report.flipped_triangles.count, got.mesh.census().orientable), (0, false));
+}

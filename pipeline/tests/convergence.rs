@@ -1,0 +1,77 @@
+//! Convergence: halving the mesh must divide the error as theory says.
+
+use pipeline::boundary::Boundary;
+use pipeline::closed::ClosedChart;
+use pipeline::element::{basis, stiffness};
+use pipeline::linear::harmonic_places;
+use pipeline::quadratic::quadratic_map;
+use pipeline::space::{Vec3, midpoint, triangle_area};
+use pipeline::{decompose, repair, shapes};
+
+/// Real and imaginary part of e^z / 4, which are harmonic.
+fn exact(p: Vec3) -> [f64; 2] {
+    let scale = 0.25 * p[0].exp();
+    [scale * p[1].cos(), scale * p[1].sin()]
+}
+
+/// A rule of degree 5 with seven points (Radon 1948, doi 10.1007/BF01525334): barycentric coordinates and weights.
+fn rule() -> Vec<([f64; 3], f64)> {
+    let root = 15.0_f64.sqrt();
+    let mut points = vec![([1.0 / 3.0; 3], 9.0 / 40.0)];
+    for sign in [-1.0, 1.0] {
+        let (a, weight) = ((6.0 + sign * root) / 21.0, (155.0 + sign * root) / 1200.0);
+        let b = 1.0 - 2.0 * a;
+        points.extend([[b, a, a], [a, b, a], [a, a, b]].map(|l| (l, weight)));
+    }
+    points
+}
+
+/// The L2 errors of the linear and the quadratic harmonic map on a flat disk with `rings` rings.
+fn errors(rings: u32) -> [f64; 2] {
+    let mesh = repair(&shapes::flat_disk(rings), &Default::default()).expect("a surface").mesh;
+    let chart = ClosedChart::new(&decompose(&mesh).expect("one chart").charts()[0]);
+    let place = |v: pipeline::id::VertexId| mesh.points()[v.index()];
+    let ends = |h: &pipeline::id::HalfEdgeId| chart.ends(*h).map(place);
+    let vertices: Vec<_> = chart.outer().iter().map(|h| exact(ends(h)[0])).collect();
+    let mids: Vec<_> = chart.outer().iter().map(|h| exact(midpoint(ends(h)[0], ends(h)[1]))).collect();
+    let boundary = Boundary::through(&chart, &vertices, &mids).expect("one per node");
+    let linear = harmonic_places(&chart, &boundary).expect("solves");
+    let quadratic = quadratic_map(&chart, &boundary).expect("solves");
+    let mut squares = [0.0; 2];
+    for (f, t) in chart.triangles().iter().enumerate() {
+        let corners = t.map(place);
+        for (l, weight) in rule() {
+            let x = [0, 1, 2].map(|k| (0..3).map(|i| l[i] * corners[i][k]).sum());
+            let p1 = [0, 1].map(|k| (0..3).map(|i| l[i] * linear[t[i].index()].uv()[k]).sum::<f64>());
+            let nodes = chart.nodes(f).map(|n| quadratic.nodes()[n].uv());
+            let p2 = [0, 1].map(|k| (0..6).map(|n| basis(l)[n] * nodes[n][k]).sum::<f64>());
+            for (square, got) in squares.iter_mut().zip([p1, p2]) {
+                let off = [0, 1].map(|k| got[k] - exact(x)[k]);
+                *square += weight * triangle_area(corners) * (off[0] * off[0] + off[1] * off[1]);
+            }
+        }
+    }
+    squares.map(f64::sqrt)
+}
+
+#[test]
+fn linear_elements_are_of_order_2_and_quadratic_ones_of_order_3() {
+    let [coarse, fine] = [errors(16), errors(32)];
+    let orders = [0, 1].map(|k| (coarse[k] / fine[k]).log2());
+    assert!((orders[0] - 2.0).abs() < 0.1 && (orders[1] - 3.0).abs() < 0.1, "{orders:?} {coarse:?} {fine:?}");
+}
+
+/// The energy of e^z / 4 over a triangle, by its exact gradient, against that of its quadratic interpolant.
+#[test]
+fn the_energy_of_the_interpolant_converges() {
+    let p: [Vec3; 3] = [[0.1, 0.2, 0.0], [0.13, 0.2, 0.0], [0.1, 0.24, 0.0]];
+    let shape = pipeline::mesh::TriangleShape::of(p);
+    let nodes = [p[0], p[1], p[2], midpoint(p[0], p[1]), midpoint(p[1], p[2]), midpoint(p[2], p[0])].map(exact);
+    let discrete = pipeline::element::energy(&stiffness(&shape), &nodes);
+    let density = |l: [f64; 3]| {
+        let x: f64 = (0..3).map(|i| l[i] * p[i][0]).sum();
+        (0.25 * x.exp()).powi(2)
+    };
+    let continuous: f64 = rule().iter().map(|(l, w)| w * triangle_area(p) * density(*l)).sum();
+    assert!((discrete / continuous - 1.0).abs() < 1e-6, "{discrete} {continuous}");
+}
