@@ -18,6 +18,12 @@ pub enum InputError {
     /// A folder holds no mesh.
     #[error("the folder {0} holds no mesh file; name a file or another folder")]
     EmptyFolder(PathBuf),
+    /// A path does not end in a name.
+    #[error("{0} does not name a file")]
+    NoName(PathBuf),
+    /// An input lies in the output folder itself.
+    #[error("{0} lies in the output folder, where its result would take its place; use another output folder")]
+    InsideOut(PathBuf),
     /// Two inputs have the same name.
     #[error(
         "{0} and {1} have the same name, so that their results would overwrite each other; rename one, or use two output folders"
@@ -36,8 +42,10 @@ pub fn collect(inputs: &[PathBuf]) -> Result<Vec<Job>, InputError> {
         // A file that does not exist becomes a job too: it is refused, and the others are done all the same.
         if input.is_dir() {
             jobs.extend(folder(input)?);
-        } else {
+        } else if input.file_name().is_some() {
             jobs.push(Job::new(input.clone()));
+        } else {
+            return Err(InputError::NoName(input.clone()));
         }
     }
     let mut by_name: Vec<&Job> = jobs.iter().collect();
@@ -45,6 +53,19 @@ pub fn collect(inputs: &[PathBuf]) -> Result<Vec<Job>, InputError> {
     match by_name.windows(2).find(|w| w[0].name == w[1].name) {
         Some(same) => Err(InputError::SameName(same[0].path.clone(), same[1].path.clone())),
         None => Ok(jobs),
+    }
+}
+
+/// Refuses inputs that lie in the output folder itself: a result has the name of its input.
+///
+/// # Errors
+/// [`InputError::InsideOut`].
+pub fn refuse_inside(jobs: &[Job], out: &Path) -> Result<(), InputError> {
+    let Ok(out) = out.canonicalize() else { return Ok(()) };
+    let folder = |job: &Job| job.path.canonicalize().ok().and_then(|p| p.parent().map(Path::to_owned));
+    match jobs.iter().find(|job| folder(job).is_some_and(|f| f == out)) {
+        Some(job) => Err(InputError::InsideOut(job.path.clone())),
+        None => Ok(()),
     }
 }
 

@@ -28,16 +28,26 @@ pub struct Publisher {
 
 /// Why nothing could be published.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {path}: {error}; check that the disk has room and the folder may be written")]
-pub struct PublishError {
-    path: PathBuf,
-    error: io::Error,
+pub enum PublishError {
+    /// The system refuses.
+    #[error("cannot write {path}: {error}; check that the disk has room and the folder may be written")]
+    Io {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// Something stands where the result belongs.
+    #[error(
+        "{0} is there already and is no result of planish: it was left alone; move it away or use another output folder"
+    )]
+    Foreign(PathBuf),
 }
 
 /// Attaches the path to an I/O error.
 fn at(path: &Path) -> impl FnOnce(io::Error) -> PublishError {
     let path = path.to_owned();
-    move |error| PublishError { path, error }
+    move |error| PublishError::Io { path, error }
 }
 
 impl Publisher {
@@ -68,6 +78,10 @@ impl Publisher {
     /// # Errors
     /// [`PublishError`]; then an older result is untouched.
     pub fn publish(&self, name: &OsStr, files: &[(String, Vec<u8>)]) -> Result<(), PublishError> {
+        let target = self.target(name);
+        if !may_be_replaced(&target) {
+            return Err(PublishError::Foreign(target));
+        }
         let parent = tempfile::tempdir_in(self.staging.path()).map_err(at(self.staging.path()))?;
         let fresh = parent.path().join(name);
         fs::create_dir(&fresh).map_err(at(&fresh))?;
@@ -76,9 +90,19 @@ impl Publisher {
             write_synced(&path, bytes).map_err(at(&path))?;
         }
         sync_folder(&fresh).map_err(at(&fresh))?;
-        let target = self.target(name);
         put_in_place(&fresh, &target, parent.path()).map_err(at(&target))?;
         sync_folder(&self.out).map_err(at(&self.out))
+    }
+}
+
+/// Whether nothing is there, or an older result (a folder with a report), or an empty folder.
+fn may_be_replaced(target: &Path) -> bool {
+    match fs::symlink_metadata(target) {
+        Err(e) => e.kind() == io::ErrorKind::NotFound,
+        Ok(m) if !m.is_dir() => false,
+        Ok(_) => {
+            target.join(crate::report::FILE).is_file() || fs::read_dir(target).is_ok_and(|mut d| d.next().is_none())
+        }
     }
 }
 
@@ -130,7 +154,7 @@ mod tests {
     use super::*;
 
     fn files(text: &str) -> Vec<(String, Vec<u8>)> {
-        vec![("a.txt".to_owned(), text.into()), ("b.txt".to_owned(), text.into())]
+        vec![(crate::report::FILE.to_owned(), text.into()), ("b.txt".to_owned(), text.into())]
     }
 
     #[test]
@@ -158,9 +182,26 @@ mod tests {
         let publisher = Publisher::open(out.path()).expect("opens");
         let name = OsStr::new("part.stl");
         publisher.publish(name, &files("old")).expect("published");
-        let broken = vec![("a.txt".to_owned(), vec![]), ("no/such/folder.txt".to_owned(), vec![])];
+        let broken = vec![("b.txt".to_owned(), vec![]), ("no/such/folder.txt".to_owned(), vec![])];
         assert!(publisher.publish(name, &broken).is_err());
-        assert_eq!(fs::read_to_string(publisher.target(name).join("a.txt")).expect("there"), "old");
+        assert_eq!(fs::read_to_string(publisher.target(name).join("b.txt")).expect("there"), "old");
+    }
+
+    #[test]
+    fn what_is_no_result_is_never_replaced() {
+        let out = tempfile::tempdir().expect("a folder");
+        let publisher = Publisher::open(out.path()).expect("opens");
+        fs::write(out.path().join("part.stl"), "an input").expect("written");
+        fs::create_dir(out.path().join("folder.stl")).expect("made");
+        fs::write(out.path().join("folder.stl/precious.txt"), "work").expect("written");
+        for name in ["part.stl", "folder.stl", "", STAGING] {
+            let refused = publisher.publish(OsStr::new(name), &files("new"));
+            assert!(matches!(refused, Err(PublishError::Foreign(_))), "{name}: {refused:?}");
+        }
+        assert_eq!(fs::read_to_string(out.path().join("part.stl")).expect("there"), "an input");
+        assert!(out.path().join("folder.stl/precious.txt").exists());
+        fs::create_dir(out.path().join("empty.stl")).expect("made");
+        assert!(publisher.publish(OsStr::new("empty.stl"), &files("new")).is_ok());
     }
 
     #[test]

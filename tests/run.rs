@@ -61,6 +61,10 @@ fn wrong_usage_is_exit_code_2_and_does_nothing() {
     assert_eq!(out.run(&[&disk], &["--no-such-option"]).code, Some(2));
     assert_eq!(planish(["run".as_ref(), disk.as_os_str()]).code, Some(2), "no output folder");
     assert_eq!(planish(["run", "--out", "x"]).code, Some(2), "no input");
+    assert_eq!(planish(["run", "no/such/..", "--out", "x"]).code, Some(2), "no name");
+    let beside = [copy.as_os_str(), "--out".as_ref(), twin.path().as_os_str()];
+    let ended = planish(["run".as_ref()].into_iter().chain(beside));
+    assert!(ended.code == Some(2) && copy.is_file(), "the input lies in the output folder: {}", ended.err);
     let empty = tempfile::tempdir().expect("a folder");
     assert_eq!(out.run(&[empty.path()], &[]).code, Some(2), "a folder without meshes");
     assert_eq!(std::fs::read_dir(out.path()).expect("a folder").count(), 0, "nothing was written");

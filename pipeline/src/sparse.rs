@@ -13,6 +13,9 @@ use faer::{Conj, MatMut, Par, Side};
 /// Stands for a degree of freedom that is prescribed: its row and column are not part of the system.
 pub const PRESCRIBED: u32 = u32::MAX;
 
+/// Factors larger than this (bytes) are not made. A fixed number, so that results do not depend on the machine.
+const LARGEST_FACTOR: usize = 8 << 30;
+
 /// Why a system was not solved.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
@@ -22,7 +25,7 @@ pub enum Error {
         /// The order of the matrix.
         unknowns: usize,
     },
-    /// The factor is too large for memory or for 32-bit indices.
+    /// The factor is larger than 8 GiB, or does not fit memory or 32-bit indices.
     #[error("the system of {unknowns} unknowns is too large to be factorised")]
     TooLarge {
         /// The order of the matrix.
@@ -105,7 +108,8 @@ impl Pattern {
     pub fn analyse(&self) -> Result<Analysis<'_>, Error> {
         let symbolic =
             factorize_symbolic_cholesky(self.view(), Side::Lower, SymmetricOrdering::Amd, Default::default());
-        let symbolic = symbolic.map_err(|_| Error::TooLarge { unknowns: self.unknowns })?;
+        let fits = |s: &SymbolicCholesky<u32>| s.len_val() <= LARGEST_FACTOR / size_of::<f64>();
+        let symbolic = symbolic.ok().filter(fits).ok_or(Error::TooLarge { unknowns: self.unknowns })?;
         Ok(Analysis { pattern: self, symbolic })
     }
 
@@ -130,11 +134,6 @@ pub struct Analysis<'a> {
 }
 
 impl Analysis<'_> {
-    /// The bytes that a factor takes.
-    pub fn factor_bytes(&self) -> usize {
-        self.symbolic.len_val() * size_of::<f64>()
-    }
-
     /// Factorises the matrix with these `values`.
     ///
     /// # Errors

@@ -20,6 +20,7 @@ use std::time::Duration;
 pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     let out = settings.out.as_deref().ok_or("no output folder: give --out DIR (or out = \"DIR\" in planish.toml)")?;
     let jobs = inputs::collect(paths)?;
+    inputs::refuse_inside(&jobs, out)?;
     let publisher = Publisher::open(out)?;
     let progress = progress(jobs.len(), settings.quiet);
     let mut rows = Vec::new();

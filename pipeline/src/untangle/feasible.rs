@@ -3,7 +3,7 @@
 use super::newton::minimise;
 use super::penalty::{Bound, Penalty};
 use super::problem::{ArcCell, Cell, Problem};
-use super::{Effort, LARGEST_FACTOR, on_grid, places, region};
+use super::{Effort, on_grid, places, region};
 use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
 use crate::sparse::Error;
@@ -60,9 +60,6 @@ fn descend(problem: &mut Problem, x: &mut super::Places, effort: &mut Effort) ->
     }
     let pattern = problem.pattern();
     let analysis = pattern.analyse()?;
-    if analysis.factor_bytes() > LARGEST_FACTOR {
-        return Err(Error::TooLarge { unknowns: problem.unknowns() });
-    }
     let mut last = 1.0;
     for weight in WEIGHTS {
         problem.scale_weights(weight / last);

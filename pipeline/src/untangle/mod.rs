@@ -35,9 +35,6 @@ use problem::Places;
 /// Above this share of invalid triangles the feasible path is taken at once.
 const FEW: f64 = 0.05;
 
-/// Factors larger than this (bytes) are not made: a fixed number, so that results do not depend on the machine.
-const LARGEST_FACTOR: usize = 8 << 30;
-
 /// How the result was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
