@@ -48,11 +48,19 @@ pub fn collect(inputs: &[PathBuf]) -> Result<Vec<Job>, InputError> {
             return Err(InputError::NoName(input.clone()));
         }
     }
+    Ok(jobs)
+}
+
+/// Refuses two inputs of the same name: their results would have the same place.
+///
+/// # Errors
+/// [`InputError::SameName`].
+pub fn refuse_same_names(jobs: &[Job]) -> Result<(), InputError> {
     let mut by_name: Vec<&Job> = jobs.iter().collect();
     by_name.sort_by(|a, b| a.name.cmp(&b.name));
     match by_name.windows(2).find(|w| w[0].name == w[1].name) {
         Some(same) => Err(InputError::SameName(same[0].path.clone(), same[1].path.clone())),
-        None => Ok(jobs),
+        None => Ok(()),
     }
 }
 
@@ -106,7 +114,8 @@ mod tests {
         let names: Vec<_> = jobs.iter().map(|j| j.name.to_string_lossy().into_owned()).collect();
         assert_eq!(names, ["a.obj", "b.stl", "c.ply"]);
         let twice = [folder.path().to_owned(), folder.path().join("b.stl")];
-        assert!(matches!(collect(&twice), Err(InputError::SameName(..))));
+        let jobs = collect(&twice).expect("meshes");
+        assert!(matches!(refuse_same_names(&jobs), Err(InputError::SameName(..))));
         let none = tempfile::tempdir().expect("a folder");
         assert!(matches!(collect(&[none.path().to_owned()]), Err(InputError::EmptyFolder(_))));
         assert_eq!(collect(&[none.path().join("gone.stl")]).expect("a job, to be refused").len(), 1);

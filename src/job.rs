@@ -146,17 +146,19 @@ impl Job {
     /// The published report, if it is that of the same content, settings and version, and its files are there.
     fn up_to_date(&self, publisher: &Publisher, fresh: &Report) -> Option<Report> {
         let folder = publisher.target(&self.name);
-        let older: Report = serde_json::from_slice(&std::fs::read(folder.join(report::FILE)).ok()?).ok()?;
+        let older: Report = serde_json::from_slice(&read_file(&folder.join(report::FILE)).ok()?).ok()?;
         let same = older.input == fresh.input
             && fresh.input.blake3.is_some()
             && older.settings == fresh.settings
             && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
             && older.status != Status::Failed;
-        let there = |o: &Output| std::fs::metadata(folder.join(&o.file)).is_ok_and(|m| m.len() == o.bytes);
-        (same && older.outputs.iter().all(there)).then_some(older)
+        let there =
+            |o: &Output| read_file(&folder.join(&o.file)).is_ok_and(|content| Output::of(&o.file, &content) == *o);
+        let complete = (older.status == Status::Certified) != older.outputs.is_empty();
+        (same && complete && older.outputs.iter().all(there)).then_some(older)
     }
 
-    /// Runs the stages; a panic in one of them is a failure of this job, not of the program.
+    /// Runs the stages.
     fn process(
         &self,
         bytes: &[u8],
@@ -164,14 +166,9 @@ impl Job {
         report: &mut Report,
         clock: &mut Clock,
     ) -> Result<Vec<(String, Vec<u8>)>, Reason> {
-        let stages = || {
+        guard(|| {
             let soup = self.read(bytes)?;
             stages(&soup, settings, report, clock)
-        };
-        catch_unwind(AssertUnwindSafe(stages)).unwrap_or_else(|_| {
-            let message =
-                "planish broke down on this input: that is a fault of planish; please report it with the file";
-            Err(Reason::new(Code::Internal, message))
         })
     }
 
@@ -215,6 +212,17 @@ impl Job {
         }
         Ok(Done { report, up_to_date: false })
     }
+}
+
+/// Does `work`; a panic in it is a failure of this input, not of the program.
+///
+/// # Errors
+/// Those of `work`, and [`Code::Internal`] for a panic.
+pub fn guard<T>(work: impl FnOnce() -> Result<T, Reason>) -> Result<T, Reason> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
+        let message = "planish broke down on this input: that is a fault of planish; please report it with the file";
+        Err(Reason::new(Code::Internal, message))
+    })
 }
 
 /// Reads a regular file whole. Anything else (a folder, a pipe, a device) could block for ever.

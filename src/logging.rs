@@ -1,6 +1,7 @@
 //! Log messages, on standard error.
 
 use crate::settings::{Log, Settings};
+use std::io::IsTerminal;
 use tracing::level_filters::LevelFilter;
 
 /// Starts logging. A panic becomes a log message too: it is caught per job, and told there.
@@ -14,6 +15,7 @@ pub fn start(settings: &Settings) {
         (false, _) => LevelFilter::TRACE,
     };
     let builder = tracing_subscriber::fmt().with_max_level(level).with_writer(std::io::stderr).with_target(false);
+    let builder = builder.with_ansi(std::io::stderr().is_terminal());
     // A second call, as tests make it, keeps the first subscriber.
     let _ = match settings.log {
         Log::Text => tracing::subscriber::set_global_default(builder.finish()),

@@ -116,25 +116,39 @@ fn sync_folder(path: &Path) -> io::Result<()> {
     File::open(path)?.sync_all()
 }
 
-/// Renames `fresh` to `target`. Where there is an older result the two change places in one step, and the older
-/// one goes with the staging folder; where the system cannot do that, the older one is moved away first.
+/// Renames `fresh` to `target` in one step. Where there is an older result the two change places, and the older one
+/// goes with the staging folder. Another process may put one there, or take it away, at any moment: then the other
+/// way is tried, a few times.
+#[cfg(target_os = "linux")]
 fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<()> {
-    match fs::symlink_metadata(target) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return fs::rename(fresh, target),
-        Err(e) => return Err(e),
-        Ok(_) => {}
-    }
-    #[cfg(target_os = "linux")]
-    {
-        use rustix::fs::{CWD, RenameFlags, renameat_with};
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    use rustix::io::Errno;
+    for _ in 0..16 {
+        match renameat_with(CWD, fresh, CWD, target, RenameFlags::NOREPLACE) {
+            Err(Errno::EXIST | Errno::NOTEMPTY) => {}
+            Err(Errno::INVAL | Errno::NOSYS) => break,
+            ended => return Ok(ended?),
+        }
         match renameat_with(CWD, fresh, CWD, target, RenameFlags::EXCHANGE) {
-            Ok(()) => return Ok(()),
-            Err(rustix::io::Errno::INVAL | rustix::io::Errno::NOSYS) => {}
-            Err(e) => return Err(e.into()),
+            Err(Errno::NOENT) => {}
+            Err(Errno::INVAL | Errno::NOSYS) => break,
+            ended => return Ok(ended?),
         }
     }
-    fs::rename(target, staging.join("older"))?;
-    fs::rename(fresh, target)
+    put_in_place_in_two_steps(fresh, target, staging)
+}
+
+/// Where the system cannot exchange two folders, the older one is moved away first.
+#[cfg(not(target_os = "linux"))]
+fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<()> {
+    put_in_place_in_two_steps(fresh, target, staging)
+}
+
+fn put_in_place_in_two_steps(fresh: &Path, target: &Path, staging: &Path) -> io::Result<()> {
+    match fs::rename(target, staging.join("older")) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+        _ => fs::rename(fresh, target),
+    }
 }
 
 /// Removes staging folders whose lock nobody holds.
@@ -185,6 +199,33 @@ mod tests {
         let broken = vec![("b.txt".to_owned(), vec![]), ("no/such/folder.txt".to_owned(), vec![])];
         assert!(publisher.publish(name, &broken).is_err());
         assert_eq!(fs::read_to_string(publisher.target(name).join("b.txt")).expect("there"), "old");
+    }
+
+    #[test]
+    fn systems_that_cannot_exchange_folders_are_served_in_two_steps() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [fresh, target, staging] = ["fresh", "target", "staging"].map(|n| folder.path().join(n));
+        for text in ["first", "second"] {
+            fs::create_dir(&fresh).expect("made");
+            fs::write(fresh.join("a.txt"), text).expect("written");
+            let _ = fs::remove_dir_all(&staging);
+            fs::create_dir(&staging).expect("made");
+            put_in_place_in_two_steps(&fresh, &target, &staging).expect("placed");
+            assert_eq!(fs::read_to_string(target.join("a.txt")).expect("there"), text);
+        }
+    }
+
+    #[test]
+    fn many_writers_of_one_name_all_succeed() {
+        let out = tempfile::tempdir().expect("a folder");
+        let write = || {
+            let publisher = Publisher::open(out.path()).expect("opens");
+            for _ in 0..20 {
+                publisher.publish(OsStr::new("part.stl"), &files("new")).expect("published");
+            }
+        };
+        std::thread::scope(|s| (0..4).for_each(|_| drop(s.spawn(write))));
+        assert_eq!(fs::read_to_string(out.path().join("part.stl/b.txt")).expect("there"), "new");
     }
 
     #[test]

@@ -103,6 +103,62 @@ fn a_moved_point_of_a_hole_or_a_crack_is_found_behind_new_checksums() {
     assert!(ended.code == Some(1) && ended.err.contains("oriented surface"), "{}", ended.err);
 }
 
+/// Changes the report of a result as text.
+fn reword(out: &Out, name: &str, from: &str, to: &str) {
+    let text = String::from_utf8(out.read(name, "report.json")).expect("UTF-8");
+    assert!(text.contains(from), "{from}");
+    std::fs::write(out.of(name).join("report.json"), text.replace(from, to)).expect("written");
+}
+
+#[test]
+fn what_the_report_claims_must_agree_with_the_proof() {
+    let name = "disk_with_holes.stl";
+    let lies = [
+        ("\"by_exact\": 0", "\"by_exact\": 7"),
+        ("\"proven\": true", "\"proven\": false"),
+        ("\"outer_arcs\": 68", "\"outer_arcs\": 67"),
+        ("\"loops\": 4", "\"loops\": 5"),
+        ("\"id\": 0", "\"id\": 3"),
+        ("\"det_lower_bound\": 0.", "\"det_lower_bound\": 1."),
+        ("\"reason\": null", "\"reason\": {\"code\": \"malformed\", \"message\": \"\", \"where\": null}"),
+        ("\"triangles\": 572", "\"triangles\": 18446744073709551615"),
+        ("\"schema\": 1", "\"schema\": 2"),
+    ];
+    for (from, to) in lies {
+        let out = certified(name);
+        reword(&out, name, from, to);
+        let ended = check(&out, name);
+        assert!(ended.code == Some(1) && ended.err.contains("not proven"), "{to}: {}", ended.err);
+    }
+}
+
+#[test]
+fn fields_and_positions_that_cannot_be_are_found_behind_new_checksums() {
+    let name = "disk.stl";
+    type Change = fn(&mut UnstructuredGridPiece);
+    let changes: [(&str, Change); 4] = [
+        ("not finite", |piece| {
+            let IOBuffer::F64(points) = &mut piece.points else { panic!("doubles") };
+            points[5] = f64::NAN;
+        }),
+        ("cannot be", |piece| doubles(&mut piece.data.cell, "det_min")[3] = -7.0),
+        ("cannot be", |piece| doubles(&mut piece.data.cell, "conformal_distortion")[3] = f64::NAN),
+        ("twice", |piece| {
+            let again = piece.data.point[0].clone();
+            piece.data.point.push(again);
+        }),
+    ];
+    for (said, change) in changes {
+        let out = certified(name);
+        rewrite(&out, name, "surface.vtu", change);
+        if said != "twice" {
+            forge_checksums(&out, name);
+        }
+        let ended = check(&out, name);
+        assert!(ended.code == Some(1) && ended.err.contains(said), "{said}: {}", ended.err);
+    }
+}
+
 #[test]
 fn param_must_show_the_same_map() {
     let name = "disk.stl";
@@ -151,5 +207,9 @@ fn several_results_are_checked_in_one_call() {
     let ended = planish(["check".as_ref(), report.as_os_str(), out.of("floater_five.obj").as_os_str()]);
     assert!(ended.code == Some(1) && ended.err.contains("surface.vtu"), "{}", ended.err);
     assert!(ended.out.contains("floater_five.obj"), "the other one is proven: {}", ended.out);
-    assert_eq!(planish(["check", "no/such/folder"]).code, Some(1));
+    // Only a result folder or its report is a result.
+    for other in ["no/such/folder", "floater_five.obj/param.vtu", "floater_five.obj/typo.json"] {
+        let ended = planish(["check".as_ref(), out.path().join(other).as_os_str()]);
+        assert!(ended.code == Some(1) && ended.out.is_empty(), "{other}: {}", ended.out);
+    }
 }

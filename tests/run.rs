@@ -19,7 +19,7 @@ fn refusals_say_where_and_what_to_do() {
         ("nan.stl", &nan, Code::NotFinite, Some("byte 134")),
         ("inf.obj", b"v 0 0 0\nv 1 inf 0\nv 0 1 0\nf 1 2 3\n", Code::NotFinite, Some("line 2")),
         ("index.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", Code::Malformed, Some("line 4")),
-        ("word.stl", b"solid\nfacet normal 0 0 1\nouter lop\nvertex a 0 0\n", Code::Malformed, Some("line 4")),
+        ("word.stl", b"solid\nfacet normal 0 0 1\nouter loop\nvertex a 0 0\n", Code::Malformed, Some("line 4")),
         ("flat.obj", b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", Code::OnlyDegenerate, None),
         ("part.xyz", b"1 2 3", Code::UnknownExtension, Some("file name")),
         ("part.ply", b"ply\n", Code::UnsupportedFormat, Some("file name")),

@@ -1,9 +1,13 @@
-//! Wavefront OBJ, read by `tobj`: groups become one soup (which repair welds again), polygons are cut into
-//! triangles, materials, normals and texture coordinates are not needed.
+//! Wavefront OBJ, read by `tobj`.
+//!
+//! Only vertices and faces matter here, so only these reach the library: lines that are continued are joined,
+//! comments, groups, materials, normals, texture coordinates, colours, points and lines are left out first. (With
+//! groups the library would copy vertices; it takes lines of three and more points for faces, and refuses normals
+//! and texture coordinates that nobody needs.) Polygons are cut into triangles.
 
 use super::{ReadError, polygon};
 use crate::outcome::Code;
-use pipeline::mesh::{SoupError, TriangleSoup};
+use pipeline::mesh::TriangleSoup;
 
 /// Why bytes are no OBJ file.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -36,7 +40,7 @@ pub enum ObjError {
         /// The line's text, shortened.
         text: String,
     },
-    /// The library found an error that the line by line search does not.
+    /// The library found an error that the search before it does not.
     #[error("the file cannot be read as OBJ ({problem}); export it again")]
     Library {
         /// The library's words.
@@ -63,64 +67,97 @@ impl ObjError {
 pub(super) fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
     // Names and comments may be in any encoding; numbers are ASCII.
     let text = String::from_utf8_lossy(bytes);
-    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
+    let statements = statements(&text);
+    check(&statements)?;
+    let geometry: String = statements.iter().map(|s| format!("{}\n", s.words.join(" "))).collect();
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let loaded = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials);
-    let (models, _) = loaded.map_err(|e| locate(&text, &e))?;
+    let loaded = tobj::load_obj_buf(&mut geometry.as_bytes(), &tobj::LoadOptions::default(), no_materials);
+    let (models, _) = loaded.map_err(|e| ObjError::Library { problem: e.to_string() })?;
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     for mesh in models.iter().map(|m| &m.mesh) {
         let base = points.len() as u32;
         points.extend(mesh.positions.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
         let mut rest = &mesh.indices[..];
-        let sizes = mesh.face_arities.iter().map(|a| *a as usize).chain(std::iter::repeat(3));
-        for size in sizes.take(if mesh.face_arities.is_empty() { rest.len() / 3 } else { mesh.face_arities.len() }) {
-            let (face, others) = rest.split_at(size.min(rest.len()));
+        let triangles_only = mesh.face_arities.is_empty().then(|| vec![3; rest.len() / 3]);
+        for size in triangles_only.as_ref().unwrap_or(&mesh.face_arities) {
+            let (face, others) = rest.split_at((*size as usize).min(rest.len()));
             let corners: Vec<u32> = face.iter().map(|i| base + i).collect();
             triangles.extend(polygon::triangulate(&corners, &points));
             rest = others;
         }
     }
-    match TriangleSoup::new(points, triangles) {
-        Err(error @ SoupError::NotFinite { .. }) => Err(first_bad_number(&text).map_or(error.into(), ReadError::Obj)),
-        other => Ok(other?),
-    }
+    Ok(TriangleSoup::new(points, triangles)?)
 }
 
-/// Finds the line that `tobj`, which tells none, stumbled over.
-fn locate(text: &str, error: &tobj::LoadError) -> ObjError {
-    let vertices = text.lines().filter(|l| l.split_whitespace().next() == Some("v")).count();
-    let bad_face = || text.lines().zip(1..).find_map(|(text, line)| bad_face(text, line, vertices));
-    first_bad_number(text).or_else(bad_face).unwrap_or(ObjError::Library { problem: error.to_string() })
+/// A vertex or face: its keyword and numbers, and its (first) line in the file, from 1.
+struct Statement<'a> {
+    words: Vec<&'a str>,
+    line: usize,
 }
 
-/// The first vertex line whose coordinates are no finite numbers.
-fn first_bad_number(text: &str) -> Option<ObjError> {
-    text.lines().zip(1..).find_map(|(text, line)| {
-        let mut words = text.split_whitespace();
-        let coordinates: Vec<&str> = (words.next() == Some("v")).then(|| words.take(3).collect())?;
-        let syntax = || ObjError::Syntax { line, text: shown(text) };
-        if coordinates.len() < 3 {
-            return Some(syntax());
+/// The vertices (three coordinates each) and faces (vertex indices only) of a file, in their order.
+fn statements(text: &str) -> Vec<Statement<'_>> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let separator = if text.contains('\n') { '\n' } else { '\r' };
+    let mut found = Vec::new();
+    let (mut words, mut first): (Vec<&str>, usize) = (Vec::new(), 1);
+    for (line, number) in text.split(separator).zip(1..) {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        let continued = line.strip_suffix('\\');
+        words.extend(continued.unwrap_or(line).split_whitespace());
+        if continued.is_none() {
+            found.extend(geometry(std::mem::take(&mut words)).map(|words| Statement { words, line: first }));
+            first = number + 1;
         }
-        coordinates.iter().find_map(|word| match word.parse::<f64>() {
-            Ok(number) if number.is_finite() => None,
-            Ok(_) => Some(ObjError::NotFinite { line, value: shown(word) }),
-            Err(_) => Some(syntax()),
-        })
-    })
+    }
+    found.extend(geometry(words).map(|words| Statement { words, line: first }));
+    found
 }
 
-/// A face line whose indices are no numbers or out of range.
-fn bad_face(text: &str, line: usize, vertices: usize) -> Option<ObjError> {
-    let mut words = text.split_whitespace();
-    if words.next() != Some("f") {
-        return None;
+/// What a statement says about vertices and faces, if anything.
+fn geometry(mut words: Vec<&str>) -> Option<Vec<&str>> {
+    match *words.first()? {
+        "v" => words.truncate(4),
+        // The old keyword "fo" means the same.
+        "f" | "fo" => {
+            words[0] = "f";
+            words[1..].iter_mut().for_each(|w| *w = w.split('/').next().unwrap_or_default());
+        }
+        _ => return None,
     }
-    words.find_map(|word| match word.split('/').next().unwrap_or_default().parse::<i64>() {
-        Ok(index) if index != 0 && index.unsigned_abs() as usize <= vertices => None,
-        Ok(index) => Some(ObjError::OutOfRange { line, index, vertices }),
-        Err(_) => Some(ObjError::Syntax { line, text: shown(text) }),
-    })
+    Some(words)
+}
+
+/// Finds what the library would refuse without telling the line.
+fn check(statements: &[Statement]) -> Result<(), ObjError> {
+    let vertices = statements.iter().filter(|s| s.words[0] == "v").count();
+    let mut so_far = 0;
+    for statement in statements {
+        let line = statement.line;
+        let syntax = || ObjError::Syntax { line, text: shown(&statement.words.join(" ")) };
+        if statement.words.len() < 4 {
+            return Err(syntax());
+        }
+        if statement.words[0] == "v" {
+            so_far += 1;
+            for word in &statement.words[1..] {
+                let number: f64 = word.parse().map_err(|_| syntax())?;
+                if !number.is_finite() {
+                    return Err(ObjError::NotFinite { line, value: shown(word) });
+                }
+            }
+            continue;
+        }
+        for word in &statement.words[1..] {
+            let index: i64 = word.parse().map_err(|_| syntax())?;
+            // Negative indices count back from the vertices so far.
+            let limit = if index < 0 { so_far } else { vertices };
+            if index == 0 || index.unsigned_abs() > limit as u64 {
+                return Err(ObjError::OutOfRange { line, index, vertices: limit });
+            }
+        }
+    }
+    Ok(())
 }
 
 fn shown(text: &str) -> String {
@@ -130,6 +167,7 @@ fn shown(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pipeline::mesh::SoupError;
 
     const SQUARE: &str = "# caf\u{e9}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
@@ -153,6 +191,23 @@ mod tests {
     }
 
     #[test]
+    fn what_exporters_write_besides_triangles_does_no_harm() {
+        let plain = read(format!("{SQUARE}f 1 2 3\nf 1 3 4\n").as_bytes()).expect("triangles");
+        let files = [
+            format!("\u{feff}{}f 1 2 3\nf 1 3 4\n", SQUARE.trim_start_matches("# caf\u{e9}\n")),
+            format!("{SQUARE}vt 0.5\nvn -1.#IND 0 0\nvt x\nf 1/1/1 2/9/9 3\nf 1/-9 3 4\n"),
+            format!("{SQUARE}f 1 2 3 # one\nf 1 \\\n3 \\\n4\nl 1 3 4\np 1\nusemtl\n"),
+            format!("{SQUARE}f 1 2 3\nf 1 3 4\n").replace('\n', "\r"),
+            format!("f 1 2 3\ng late\nfo 1 3 4\n{SQUARE}"),
+            format!("{SQUARE}f 1 2 3\nf 1 3 4\n").replace(" 0\n", " 0 0.5 0.5 0.5\n"),
+        ];
+        for (i, file) in files.iter().enumerate() {
+            let soup = read(file.as_bytes()).unwrap_or_else(|e| panic!("file {i}: {e}"));
+            assert_eq!(soup, plain, "file {i}");
+        }
+    }
+
+    #[test]
     fn groups_are_joined() {
         let soup = read(format!("{SQUARE}mtllib a.mtl\ng one\nusemtl b\nf 1 2 3\ng two\nf 1 3 4\n").as_bytes());
         let soup = soup.expect("two groups");
@@ -171,6 +226,11 @@ mod tests {
         );
         assert!(matches!(error("v 0 0 0\nv 1 x 0\nv 0 1 0\nf 1 2 3\n"), ObjError::Syntax { line: 2, .. }));
         assert!(matches!(error(&format!("{SQUARE}f 1 2 z\n")), ObjError::Syntax { line: 6, .. }));
+        assert!(matches!(error(&format!("{SQUARE}f 1 2\n")), ObjError::Syntax { line: 6, .. }));
+        assert!(matches!(
+            error("v 0 0 0\nv 1 0 0\nf -1 -2 -3\nv 0 1 0\n"),
+            ObjError::OutOfRange { line: 3, index: -3, .. }
+        ));
         assert!(matches!(read(SQUARE.as_bytes()), Err(ReadError::Soup(SoupError::NoTriangles { .. }))));
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! A file is binary when its size is that of its declared triangles (84 + 50 n bytes), whatever its header says:
 //! some binary files begin with "solid". Otherwise it is ASCII when its first word is "solid", in any case and
-//! after any blanks. ASCII files may hold several solids; all of them are read.
+//! after any blanks, and text follows. ASCII files may hold several solids; all of them are read. Words count, not
+//! lines: a facet may stand on one line.
 
 use super::ReadError;
 use crate::outcome::Code;
@@ -23,11 +24,25 @@ pub enum StlError {
         /// Size of the file.
         size: usize,
     },
-    /// The declared number of triangles does not fit the size of the file.
+    /// There are fewer bytes than the declared number of triangles takes.
     #[error(
         "the header declares {declared} triangles ({needed} bytes), but the file has {size} bytes, room for {room}; it was cut off or is no STL: copy or export it again"
     )]
     Count {
+        /// Triangles declared.
+        declared: u32,
+        /// Bytes they need.
+        needed: u64,
+        /// Bytes there are.
+        size: usize,
+        /// Whole triangles that fit.
+        room: usize,
+    },
+    /// There are more bytes than the declared number of triangles takes.
+    #[error(
+        "the header declares {declared} triangles ({needed} bytes), but the file has {size} bytes, room for {room}; correct the count at byte 80, cut the file off after its triangles, or export it again"
+    )]
+    Excess {
         /// Triangles declared.
         declared: u32,
         /// Bytes they need.
@@ -74,7 +89,7 @@ pub enum StlError {
 impl StlError {
     pub(super) fn code(&self) -> Code {
         match self {
-            Self::Count { .. } => Code::CountMismatch,
+            Self::Count { .. } | Self::Excess { .. } => Code::CountMismatch,
             Self::BinaryNotFinite { .. } | Self::AsciiNotFinite { .. } => Code::NotFinite,
             Self::Short { .. } | Self::Syntax { .. } | Self::Truncated { .. } => Code::Malformed,
         }
@@ -83,7 +98,7 @@ impl StlError {
     pub(super) fn place(&self) -> Option<String> {
         Some(match self {
             Self::Short { size } => format!("byte {size}"),
-            Self::Count { .. } => "byte 80".to_owned(),
+            Self::Count { .. } | Self::Excess { .. } => "byte 80".to_owned(),
             Self::BinaryNotFinite { byte, .. } => format!("byte {byte}"),
             Self::AsciiNotFinite { line, .. } | Self::Syntax { line, .. } | Self::Truncated { line } => {
                 format!("line {line}")
@@ -118,12 +133,27 @@ fn needed(triangles: u32) -> u64 {
 fn mismatch(declared: Option<u32>, size: usize) -> StlError {
     match declared {
         None => StlError::Short { size },
-        Some(declared) => StlError::Count { declared, needed: needed(declared), size, room: (size - HEADER) / RECORD },
+        Some(declared) => {
+            let (needed, room) = (needed(declared), (size - HEADER) / RECORD);
+            if needed > size as u64 {
+                StlError::Count { declared, needed, size, room }
+            } else {
+                StlError::Excess { declared, needed, size, room }
+            }
+        }
     }
 }
 
+/// Whether the first word is "solid" and what follows is text: a binary header may begin with the word, too.
 fn begins_with_solid(bytes: &[u8]) -> bool {
-    bytes.trim_ascii_start().get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"))
+    let text = text(bytes);
+    let word = text.get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
+    word && !text.iter().take(1024).any(|b| *b == 0)
+}
+
+/// The bytes without a byte order mark and leading blanks.
+fn text(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start()
 }
 
 /// The corners of all triangles: three vectors of three little-endian floats after each normal.
@@ -144,52 +174,121 @@ fn binary(records: &[u8]) -> Result<Vec<[f64; 3]>, StlError> {
     Ok(points)
 }
 
+/// The words of a file, each with its line (from 1). Lines end with a line feed, a carriage return, or both.
+struct Words<'a> {
+    rest: &'a [u8],
+    line: usize,
+}
+
+impl<'a> Words<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        Self { rest: bytes, line: 1 }
+    }
+
+    /// Passes over blanks, counting lines; whether a line ended there.
+    fn blanks(&mut self) -> bool {
+        let before = self.line;
+        while let Some((first, rest)) = self.rest.split_first().filter(|(b, _)| b.is_ascii_whitespace()) {
+            let pair = *first == b'\r' && rest.first() == Some(&b'\n');
+            self.line += usize::from(*first == b'\n' || (*first == b'\r' && !pair));
+            self.rest = rest;
+        }
+        self.line != before
+    }
+
+    /// The next word, in lower case, and whether it begins a line.
+    fn next(&mut self) -> Option<(&'a [u8], bool)> {
+        let new_line = self.blanks();
+        let end = self.rest.iter().position(u8::is_ascii_whitespace).unwrap_or(self.rest.len());
+        let (word, rest) = self.rest.split_at(end);
+        self.rest = rest;
+        (!word.is_empty()).then_some((word, new_line))
+    }
+
+    /// Passes over the name of a solid: the rest of the line, or what stands before a facet on the same line.
+    fn name(&mut self) {
+        loop {
+            let (rest, line) = (self.rest, self.line);
+            let Some((word, new_line)) = self.next() else { return };
+            let mut ahead = Self { rest: self.rest, line };
+            let facet = is(word, "facet") && ahead.next().is_some_and(|(next, _)| is(next, "normal"));
+            if new_line || facet || is(word, "endsolid") {
+                (self.rest, self.line) = (rest, line);
+                return;
+            }
+        }
+    }
+}
+
+fn is(word: &[u8], keyword: &str) -> bool {
+    word.eq_ignore_ascii_case(keyword.as_bytes())
+}
+
 /// The corners of all triangles of all solids.
 fn ascii(bytes: &[u8]) -> Result<Vec<[f64; 3]>, StlError> {
     let mut points: Vec<[f64; 3]> = Vec::new();
-    let (mut line, mut in_solid) = (0, false);
+    let mut words = Words::new(text(bytes));
+    words.line += bytes[..bytes.len() - text(bytes).len()].iter().filter(|b| **b == b'\n').count();
+    let mut in_solid = false;
     // Corners of the facet at hand; none outside of facets.
     let mut corners: Option<usize> = None;
-    for text in bytes.split(|b| *b == b'\n') {
-        line += 1;
-        let mut words = text.split(|b| b.is_ascii_whitespace()).filter(|w| !w.is_empty());
-        let Some(first) = words.next() else { continue };
+    while let Some((word, _)) = words.next() {
+        let line = words.line;
         let problem = |problem: &str| StlError::Syntax { line, problem: problem.to_owned() };
-        match (first.to_ascii_lowercase().as_slice(), corners) {
-            (b"solid", None) => in_solid = true,
-            (b"endsolid", None) => in_solid = false,
+        match (word.to_ascii_lowercase().as_slice(), corners) {
+            (b"solid", None) => {
+                in_solid = true;
+                words.name();
+            }
+            (b"endsolid", None) => {
+                in_solid = false;
+                words.name();
+            }
             (b"facet", None) if in_solid => corners = Some(0),
             (b"vertex", Some(n)) if n < 3 => {
-                points.push(vertex(&mut words, line)?);
+                points.push(vertex(&mut words)?);
                 corners = Some(n + 1);
             }
             (b"vertex", Some(_)) => return Err(problem("a facet has more than three vertices")),
-            (b"outer" | b"endloop", Some(_)) => {}
             (b"endfacet", Some(3)) => corners = None,
             (b"endfacet", Some(n)) => return Err(problem(&format!("a facet ends after {n} vertices"))),
-            _ => return Err(problem(&format!("unexpected \"{}\"", shown(first)))),
+            (b"solid" | b"endsolid" | b"facet", Some(n)) => {
+                return Err(problem(&format!("\"{}\" in the middle of a facet ({n} vertices so far)", shown(word))));
+            }
+            // The normal, "outer loop", "endloop": they say nothing that the corners do not.
+            (b"normal" | b"outer" | b"loop" | b"endloop", Some(_)) => {}
+            (_, Some(_)) if number(word).is_some() => {}
+            (b"color", _) => words.name(),
+            _ => return Err(problem(&format!("unexpected \"{}\"", shown(word)))),
         }
     }
-    if in_solid { Err(StlError::Truncated { line }) } else { Ok(points) }
+    if in_solid { Err(StlError::Truncated { line: words.line }) } else { Ok(points) }
 }
 
-/// The three numbers of a vertex line.
-fn vertex<'a>(words: &mut impl Iterator<Item = &'a [u8]>, line: usize) -> Result<[f64; 3], StlError> {
+fn number(word: &[u8]) -> Option<f64> {
+    std::str::from_utf8(word).ok().and_then(|w| w.parse::<f64>().ok())
+}
+
+/// The three numbers of a vertex; a fourth one is an error.
+fn vertex(words: &mut Words) -> Result<[f64; 3], StlError> {
     let mut point = [0.0; 3];
     for c in &mut point {
-        let word = words.next().ok_or(StlError::Syntax { line, problem: "a vertex needs three numbers".to_owned() })?;
-        let number = std::str::from_utf8(word).ok().and_then(|w| w.parse::<f64>().ok());
-        *c = number.ok_or_else(|| StlError::Syntax { line, problem: format!("\"{}\" is no number", shown(word)) })?;
+        let syntax = |line, problem| StlError::Syntax { line, problem };
+        let Some((word, _)) = words.next() else {
+            return Err(syntax(words.line, "a vertex needs three numbers".to_owned()));
+        };
+        *c = number(word).ok_or_else(|| syntax(words.line, format!("\"{}\" is no number", shown(word))))?;
         if !c.is_finite() {
-            return Err(StlError::AsciiNotFinite { line, value: shown(word) });
+            return Err(StlError::AsciiNotFinite { line: words.line, value: shown(word) });
         }
     }
-    match words.next() {
-        Some(word) => Err(StlError::Syntax {
-            line,
-            problem: format!("\"{}\" follows the three numbers of a vertex", shown(word)),
-        }),
-        None => Ok(point),
+    let mut ahead = Words { rest: words.rest, line: words.line };
+    match ahead.next() {
+        Some((word, _)) if number(word).is_some() => {
+            let problem = format!("\"{}\" follows the three numbers of a vertex", shown(word));
+            Err(StlError::Syntax { line: ahead.line, problem })
+        }
+        _ => Ok(point),
     }
 }
 
@@ -233,6 +332,17 @@ mod tests {
             format!("  \n\tSOLID one\n{}ENDSOLID one\nsolid two\n{}endsolid", facet("0").to_uppercase(), facet("2"));
         let soup = read(file.as_bytes()).expect("two solids");
         assert_eq!((soup.triangles().len(), soup.points()[3]), (2, [2.0, 0.0, 0.0]));
+        let layouts: [(&str, fn(&str) -> String); 4] = [
+            ("on one line", |f| f.replace('\n', " ")),
+            ("with carriage returns", |f| f.replace('\n', "\r")),
+            ("with a byte order mark", |f| format!("\u{feff}{f}")),
+            ("with colours", |f| f.replace("outer", "color 0.5 0.5 1\nouter")),
+        ];
+        for (how, layout) in layouts {
+            let file = layout(&format!("solid part of facets\n{0}{0}endsolid part\n", facet("0")));
+            let soup = read(file.as_bytes()).unwrap_or_else(|e| panic!("{how}: {e}"));
+            assert_eq!(soup.triangles().len(), 2, "{how}");
+        }
         let windows = format!("solid\r\n{}endsolid\r\n", facet("0").replace('\n', "\r\n"));
         assert_eq!(read(windows.as_bytes()).expect("line ends").triangles().len(), 1);
     }
@@ -250,6 +360,10 @@ mod tests {
         let file = binary_file(b"", 3, &[TRIANGLE; 2]);
         assert_eq!(error(&file), StlError::Count { declared: 3, needed: 234, size: 184, room: 2 });
         assert!(matches!(error(&file[..100]), StlError::Count { room: 0, .. }));
+        let longer = [binary_file(b"", 1, &[TRIANGLE]), vec![0; 7]].concat();
+        assert!(matches!(error(&longer), StlError::Excess { declared: 1, size: 141, .. }));
+        let named = binary_file(b"solid part", 3, &[TRIANGLE; 2]);
+        assert!(matches!(error(&named), StlError::Count { .. }), "binary, though it begins with solid");
         assert_eq!(error(b"abc"), StlError::Short { size: 3 });
     }
 
@@ -274,6 +388,7 @@ mod tests {
             assert!(read(&whole.as_bytes()[..end]).is_err(), "cut at {end}");
         }
         assert!(matches!(error(b"solid\nvertex 0 0 0\nendsolid"), StlError::Syntax { line: 2, .. }));
+        assert!(matches!(error(b"\n\nsolid\n\nfacet normal 0 0 1 nonsense"), StlError::Syntax { line: 5, .. }));
         assert!(matches!(read(b"solid\nendsolid"), Err(ReadError::Soup(_))), "no triangles");
         assert!(matches!(read(&binary_file(b"", 0, &[])), Err(ReadError::Soup(_))), "no triangles");
     }

@@ -6,7 +6,7 @@ use super::{
 };
 use pipeline::CertifiedChart;
 use pipeline::atlas::Chart;
-use pipeline::certify::PlanarMap;
+use pipeline::certify::{CertifiedMap, PlanarMap};
 use pipeline::distortion::{CellFields, Summary};
 use pipeline::mesh::Census;
 use pipeline::repair::{self, Repaired};
@@ -66,7 +66,6 @@ pub fn repairs(report: &repair::Report) -> Repairs {
 
 /// A chart with its certified map.
 pub fn chart_report(chart: &Chart, done: &CertifiedChart, fields: &[CellFields], summary: &Summary) -> ChartReport {
-    let proof = done.certified.certificate();
     let unit = chart.scale() * chart.scale();
     let det_min = fields.iter().map(|f| f.det_min).fold(f64::MAX, f64::min);
     ChartReport {
@@ -85,25 +84,31 @@ pub fn chart_report(chart: &Chart, done: &CertifiedChart, fields: &[CellFields],
             det_min: (h.det_min * unit).clamp(f64::MIN, f64::MAX),
         }),
         untangle: done.untangle.as_ref().map(|u| untangling(u, det_min)),
-        certificate: Certificate {
-            proven: true,
-            by_bounds: proof.by_bounds,
-            by_exact: proof.by_exact,
-            depth: proof.depth,
-            det_lower_bound: proof.det_lower_bound,
-            boundary: Boundary {
-                argument: "star_shaped".to_owned(),
-                outer_arcs: proof.outer_arcs,
-                holes: proof.hole_centres.len(),
-            },
-            hole_centres: proof.hole_centres.iter().map(|c| c.uv()).collect(),
-            checksum: chart_checksum(done.certified.map()),
-        },
+        certificate: certificate(&done.certified),
         distortion: Distortion {
             conformal_median: summary.conformal_median,
             conformal_p99: summary.conformal_p99,
             area_ratio: summary.area_ratio,
         },
+    }
+}
+
+/// The proof of a map.
+pub fn certificate(map: &CertifiedMap) -> Certificate {
+    let proof = map.certificate();
+    Certificate {
+        proven: true,
+        by_bounds: proof.by_bounds,
+        by_exact: proof.by_exact,
+        depth: proof.depth,
+        det_lower_bound: proof.det_lower_bound,
+        boundary: Boundary {
+            argument: "star_shaped".to_owned(),
+            outer_arcs: proof.outer_arcs,
+            holes: proof.hole_centres.len(),
+        },
+        hole_centres: proof.hole_centres.iter().map(|c| c.uv()).collect(),
+        checksum: chart_checksum(map.map()),
     }
 }
 

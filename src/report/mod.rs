@@ -5,7 +5,7 @@ mod build;
 
 use crate::outcome::{Reason, Status};
 use crate::settings::{Order, Settings};
-pub use build::{chart_checksum, chart_report, repairs, surface};
+pub use build::{certificate, chart_checksum, chart_report, repairs, surface};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

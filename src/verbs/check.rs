@@ -1,13 +1,15 @@
 //! `planish check`: prove a result again, from the files on disk.
 //!
 //! The maps are read from surface.vtu and proven by [`pipeline::certify::prove`], which knows nothing of how they
-//! were made. The only thing taken from the report is a point in each hole, which the proof tests. Checksums are a
-//! second, separate test: a map that is broken fails the first one even if all checksums were made anew.
+//! were made. The only thing taken from the report is a point in each hole, which the proof tests; what the report
+//! claims beyond that must agree with what is found. Checksums are a second, separate test: a map that is broken
+//! fails the first one even if all checksums were made anew.
 
-use super::Exit;
+use super::{Exit, say, shown};
 use crate::formats::vtu::{self, Grid};
-use crate::outcome::Status;
-use crate::report::{self, ChartReport, Report, chart_checksum};
+use crate::job::{guard, read_file};
+use crate::outcome::{Code, Reason, Status};
+use crate::report::{self, ChartReport, Report, certificate, chart_checksum};
 use pipeline::certify::{self, PlanarMap, prove};
 use pipeline::grid::GridPoint;
 use std::path::{Path, PathBuf};
@@ -32,17 +34,32 @@ fn file(file: &str, problem: impl ToString) -> Finding {
     Finding::File { file: file.to_owned(), problem: problem.to_string() }
 }
 
+/// What a check found: a line for each proven chart, and everything that is wrong.
+#[derive(Default)]
+struct Findings {
+    proven: Vec<String>,
+    wrong: Vec<Finding>,
+}
+
 /// Proves all results again; prints one line per chart.
 pub fn check(results: &[PathBuf], quiet: bool) -> Exit {
     let mut exit = Exit::Success;
     for path in results {
-        let folder = if path.is_dir() { path.as_path() } else { path.parent().unwrap_or(Path::new(".")) };
-        let (proven, findings) = check_one(folder);
-        let name = folder.display();
+        let name = shown(path);
+        let found = match folder(path) {
+            Some(folder) => guard(|| Ok(check_one(folder))).unwrap_or_else(|broken: Reason| Findings {
+                wrong: vec![file(report::FILE, broken.message)],
+                ..Findings::default()
+            }),
+            None => Findings {
+                wrong: vec![file(&name, "is neither a result folder nor a report.json")],
+                ..Findings::default()
+            },
+        };
         if !quiet {
-            proven.iter().for_each(|line| println!("{name}: {line}"));
+            found.proven.iter().for_each(|line| say(&format!("{name}: {line}")));
         }
-        for finding in &findings {
+        for finding in &found.wrong {
             eprintln!("planish: {name}: not proven: {finding}");
             exit = Exit::Refused;
         }
@@ -50,46 +67,58 @@ pub fn check(results: &[PathBuf], quiet: bool) -> Exit {
     exit
 }
 
-/// A line for each proven chart, and everything that is wrong.
-fn check_one(folder: &Path) -> (Vec<String>, Vec<Finding>) {
+/// The result folder that a path names.
+fn folder(path: &Path) -> Option<&Path> {
+    if path.is_dir() {
+        return Some(path);
+    }
+    let named = path.is_file() && path.file_name() == Some(report::FILE.as_ref());
+    let parent = path.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
+    parent.filter(|_| named)
+}
+
+fn check_one(folder: &Path) -> Findings {
+    let mut found = Findings::default();
     let report = match read_report(folder) {
         Ok(report) => report,
-        Err(finding) => return (vec![], vec![finding]),
-    };
-    let mut findings = check_outputs(folder, &report);
-    let grid = match read_grid(folder, "surface.vtu") {
-        Ok(grid) => grid,
         Err(finding) => {
-            findings.push(finding);
-            return (vec![], findings);
+            found.wrong.push(finding);
+            return found;
         }
     };
-    let mut proven = Vec::new();
-    let accounted: usize = report.charts.iter().map(|c| c.triangles).sum();
-    if accounted != grid.cells.len() || report.charts.is_empty() {
-        let problem = format!("{} triangles, but the report's charts have {accounted}", grid.cells.len());
-        findings.push(file("surface.vtu", problem));
-    }
-    for (index, chart) in report.charts.iter().enumerate() {
-        match check_chart(&grid, index, chart) {
-            Ok(line) => proven.push(line),
-            Err(finding) => findings.push(finding),
+    found.wrong.extend(check_outputs(folder, &report));
+    match read_grid(folder, "surface.vtu") {
+        Ok(grid) => {
+            found.wrong.extend(check_surface(&grid, &report));
+            for (index, chart) in report.charts.iter().enumerate() {
+                match check_chart(&grid, index, chart) {
+                    Ok(line) => found.proven.push(line),
+                    Err(finding) => found.wrong.push(finding),
+                }
+            }
+            found.wrong.extend(check_param(folder, &grid, report.charts.len()).err());
         }
+        Err(finding) => found.wrong.push(finding),
     }
-    findings.extend(check_param(folder, &grid, report.charts.len()).err());
-    (proven, findings)
+    found
+}
+
+fn read(folder: &Path, name: &str) -> Result<Vec<u8>, Finding> {
+    read_file(&folder.join(name)).map_err(|reason| file(name, reason.message))
 }
 
 fn read_report(folder: &Path) -> Result<Report, Finding> {
-    let bytes = std::fs::read(folder.join(report::FILE)).map_err(|e| file(report::FILE, e))?;
+    let bytes = read(folder, report::FILE)?;
     let report: Report = serde_json::from_slice(&bytes).map_err(|e| file(report::FILE, e))?;
     if report.schema != report::SCHEMA {
-        return Err(file(
-            report::FILE,
-            format!("schema {} is not {}, which this version checks", report.schema, report::SCHEMA),
-        ));
+        let problem = format!("schema {} is not {}, which this version checks", report.schema, report::SCHEMA);
+        return Err(file(report::FILE, problem));
     }
-    if report.status == Status::Certified { Ok(report) } else { Err(Finding::NotCertified(report.status)) }
+    match (report.status, &report.reason) {
+        (Status::Certified, None) => Ok(report),
+        (Status::Certified, Some(_)) => Err(file(report::FILE, "it is certified and has a reason against it")),
+        (status, _) => Err(Finding::NotCertified(status)),
+    }
 }
 
 /// Sizes and hashes of all files.
@@ -101,34 +130,68 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
         if Path::new(&output.file).file_name() != Some(output.file.as_ref()) {
             return Some(file(&output.file, "is no plain file name"));
         }
-        let bytes = match std::fs::read(folder.join(&output.file)) {
-            Ok(bytes) => bytes,
-            Err(e) => return Some(file(&output.file, e)),
-        };
-        let same = blake3::hash(&bytes).to_hex().as_str() == output.blake3 && bytes.len() as u64 == output.bytes;
-        (!same).then(|| file(&output.file, "its content is not what was published (size or blake3 differs)"))
+        match read(folder, &output.file) {
+            Ok(bytes) if report::Output::of(&output.file, &bytes) == *output => None,
+            Ok(_) => Some(file(&output.file, "its content is not what was published (size or blake3 differs)")),
+            Err(finding) => Some(finding),
+        }
     });
     missing.chain(damaged).collect()
 }
 
 fn read_grid(folder: &Path, name: &str) -> Result<Grid, Finding> {
-    let bytes = std::fs::read(folder.join(name)).map_err(|e| file(name, e))?;
-    vtu::read(&bytes).map_err(|e| file(name, e))
+    vtu::read(&read(folder, name)?).map_err(|e| file(name, e))
+}
+
+/// Every triangle of the surface must be in a chart, positions and fields must be numbers that can be.
+fn check_surface(grid: &Grid, report: &Report) -> Vec<Finding> {
+    let wrong = |problem: String| file("surface.vtu", problem);
+    let mut found = Vec::new();
+    let accounted = report.charts.iter().map(|c| c.triangles).try_fold(0_usize, usize::checked_add);
+    if accounted != Some(grid.cells.len()) || report.charts.is_empty() {
+        found.push(wrong(format!("{} triangles are not what the report's charts add up to", grid.cells.len())));
+    }
+    let mut ids = grid.triangle.clone();
+    ids.sort_unstable();
+    ids.dedup();
+    let whole = report.refused_components.is_empty();
+    let expected = report.surface.as_ref().map(|s| s.repaired.counts.triangles);
+    if whole && expected != Some(ids.len()) {
+        found.push(wrong(format!("{} triangles of the surface are there, the report has {expected:?}", ids.len())));
+    }
+    if let Some(point) = grid.points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+        found.push(wrong(format!("point {point} is not finite")));
+    }
+    let possible = |f: &pipeline::distortion::CellFields| {
+        f.det_min > 0.0
+            && f.det_min <= f.det_max
+            && (f64::MIN_POSITIVE..=1.0).contains(&f.jacobian_ratio)
+            && (1.0..=f64::MAX).contains(&f.conformal_distortion)
+            && (f64::MIN_POSITIVE..=f64::MAX).contains(&f.area_scale)
+            && f.det_max.is_finite()
+    };
+    if let Some(cell) = grid.fields.iter().position(|f| !possible(f)) {
+        found.push(wrong(format!("the fields of triangle {} cannot be: {:?}", grid.triangle[cell], grid.fields[cell])));
+    }
+    found
 }
 
 /// Proves one chart; the line that says so.
 fn check_chart(grid: &Grid, index: usize, chart: &ChartReport) -> Result<String, Finding> {
     let id = chart.id;
-    let wrong = |problem: String| Finding::Chart { chart: id, problem };
+    let wrong = |problem: &str| Finding::Chart { chart: id, problem: problem.to_owned() };
     let cells: Vec<usize> = (0..grid.cells.len()).filter(|c| grid.chart[*c] == index as i32).collect();
-    if cells.len() != chart.triangles {
-        return Err(wrong(format!("the file has {} triangles, the report {}", cells.len(), chart.triangles)));
+    if cells.len() != chart.triangles || id as usize != index {
+        return Err(wrong("its number, or that of its triangles, is not that of the report"));
     }
-    let map = planar_map(grid, &cells, chart).map_err(wrong)?;
+    let map = planar_map(grid, &cells, chart).map_err(|problem| wrong(&problem))?;
     let checksum = chart_checksum(&map);
     let proof = prove(map).map_err(|e| unproven(grid, &cells, id, e))?;
     if checksum != chart.certificate.checksum {
-        return Err(wrong("the map is one-to-one, but not the one that was certified (checksum differs)".to_owned()));
+        return Err(wrong("the map is one-to-one, but not the one that was certified (checksum differs)"));
+    }
+    if certificate(&proof) != chart.certificate || chart.loops != 1 + chart.certificate.hole_centres.len() {
+        return Err(wrong("the map is one-to-one, but the report's certificate says something else than the proof"));
     }
     let c = proof.certificate();
     Ok(format!(
@@ -171,11 +234,15 @@ fn unproven(grid: &Grid, cells: &[usize], chart: u32, error: certify::Error) -> 
     }
 }
 
-/// param.vtu must show the same map: same cells, same uv, points at uv plus the shift of their chart.
+/// param.vtu must show the same map: same cells, fields and uv, points at uv plus the shift of their chart.
 fn check_param(folder: &Path, surface: &Grid, charts: usize) -> Result<(), Finding> {
     let param = read_grid(folder, "param.vtu")?;
-    if param.cells != surface.cells || param.uv != surface.uv || param.chart != surface.chart {
-        return Err(file("param.vtu", "its cells, charts or uv differ from those of surface.vtu"));
+    let same = param.cells == surface.cells
+        && param.uv == surface.uv
+        && (&param.chart, &param.triangle, &param.vertex) == (&surface.chart, &surface.triangle, &surface.vertex)
+        && param.fields == surface.fields;
+    if !same {
+        return Err(file("param.vtu", "its cells, fields or uv differ from those of surface.vtu"));
     }
     for (cell, chart) in param.cells.iter().zip(&param.chart) {
         let [x, y] = vtu::shift(usize::try_from(*chart).unwrap_or(0), charts);

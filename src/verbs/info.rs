@@ -1,9 +1,9 @@
 //! `planish info`: what is this surface?
 
-use super::Exit;
+use super::{Exit, say};
 use crate::inputs;
-use crate::job::{Job, read_file};
-use crate::outcome::Reason;
+use crate::job::{Job, guard, read_file};
+use crate::outcome::{Code, Reason};
 use crate::report::{self, Counts, Repairs, Surface};
 use crate::settings::Settings;
 use pipeline::repair;
@@ -31,9 +31,9 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
             exit = Exit::Refused;
         }
         if json {
-            println!("{}", serde_json::to_string(&answer)?);
+            say(&serde_json::to_string(&answer)?);
         } else {
-            print(&answer);
+            say(&text(&answer));
         }
     }
     Ok(exit)
@@ -41,58 +41,55 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
 
 fn answer(job: &Job, settings: &Settings) -> Answer {
     let input = job.path.to_string_lossy().into_owned();
-    let refused = |reason| Answer { input: input.clone(), surface: None, repairs: None, reason: Some(reason) };
-    let soup = match read_file(&job.path).and_then(|bytes| job.read(&bytes)) {
-        Ok(soup) => soup,
-        Err(reason) => return refused(reason),
-    };
-    match repair(&soup, &pipeline::repair::Settings { weld: settings.weld }) {
+    let found = guard(|| {
+        let soup = job.read(&read_file(&job.path)?)?;
+        let found = repair(&soup, &pipeline::repair::Settings { weld: settings.weld });
+        found.map_err(|e| Reason::new(Code::OnlyDegenerate, e))
+    });
+    match found {
         Ok(found) => Answer {
             surface: Some(report::surface(&found)),
             repairs: Some(report::repairs(&found.report)),
             input,
             reason: None,
         },
-        Err(e) => refused(Reason::new(crate::outcome::Code::OnlyDegenerate, e)),
+        Err(reason) => Answer { input, surface: None, repairs: None, reason: Some(reason) },
     }
 }
 
-fn print(answer: &Answer) {
-    println!("{}", answer.input.escape_debug());
+/// The answer for people.
+fn text(answer: &Answer) -> String {
+    let mut lines = vec![answer.input.escape_debug().to_string()];
     if let Some(reason) = &answer.reason {
-        println!("  refused: {} [{}]", reason.message, reason.code.name());
+        lines.push(format!("  refused: {} [{}]", reason.message, reason.code.name()));
     }
     if let Some(surface) = &answer.surface {
-        counts("raw     ", &surface.raw);
-        counts("repaired", &surface.repaired.counts);
+        lines.push(counts("raw     ", &surface.raw));
+        lines.push(counts("repaired", &surface.repaired.counts));
         let [min, max] = surface.repaired.bbox;
-        println!("  area {:.6e}, box {min:?} to {max:?}", surface.repaired.area);
+        lines.push(format!("  area {:.6e}, box {min:?} to {max:?}", surface.repaired.area));
     }
-    if let Some(repairs) = &answer.repairs {
-        print_repairs(repairs);
-    }
+    lines.extend(answer.repairs.iter().flat_map(repairs));
+    lines.join("\n")
 }
 
-fn counts(title: &str, c: &Counts) {
+fn counts(title: &str, c: &Counts) -> String {
     let genus = c.genus.map_or("no".to_owned(), |g| g.to_string());
-    println!(
-        "  {title} {} vertices, {} triangles, {} components, {} boundary loops, genus {genus}, Euler number {}, {}",
-        c.vertices,
-        c.triangles,
-        c.components,
-        c.boundary_loops,
-        c.euler,
-        if c.orientable { "orientable" } else { "not orientable" },
+    let kind = if c.orientable { "orientable" } else { "not orientable" };
+    let mut line = format!(
+        "  {title} {} vertices, {} triangles, {} components, {} boundary loops, genus {genus}, Euler number {}, {kind}",
+        c.vertices, c.triangles, c.components, c.boundary_loops, c.euler,
     );
     if c.nonmanifold_edges + c.nonmanifold_vertices + c.inconsistent_edges > 0 {
-        println!(
-            "           {} non-manifold edges, {} non-manifold vertices, {} inconsistently oriented edges",
+        line += &format!(
+            "\n           {} non-manifold edges, {} non-manifold vertices, {} inconsistently oriented edges",
             c.nonmanifold_edges, c.nonmanifold_vertices, c.inconsistent_edges
         );
     }
+    line
 }
 
-fn print_repairs(r: &Repairs) {
+fn repairs(r: &Repairs) -> Vec<String> {
     let done = [
         (r.welded, "points welded"),
         (r.unreferenced_points, "points without triangles"),
@@ -104,8 +101,7 @@ fn print_repairs(r: &Repairs) {
         (r.mollified_triangles, "triangles mollified"),
     ];
     let said: Vec<String> = done.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
-    println!("  repairs  {}", if said.is_empty() { "none".to_owned() } else { said.join(", ") });
-    for (what, ids) in &r.first {
-        println!("           {what}: {ids:?} ...");
-    }
+    let said = if said.is_empty() { "none".to_owned() } else { said.join(", ") };
+    let first = r.first.iter().map(|(what, ids)| format!("           {what}: {ids:?} ..."));
+    std::iter::once(format!("  repairs  {said}")).chain(first).collect()
 }

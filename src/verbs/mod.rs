@@ -4,6 +4,20 @@ pub mod check;
 pub mod info;
 pub mod run;
 
+use std::io::Write;
+use std::path::Path;
+
+/// Prints a line on standard output. That nobody reads it (a closed pipe, a full disk) is no reason to stop: the
+/// exit code and the files tell the result.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+/// A path as it may be shown: on one line, whatever its bytes.
+fn shown(path: &Path) -> String {
+    path.to_string_lossy().escape_debug().to_string()
+}
+
 /// Every verb says how it ended: the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {

@@ -1,6 +1,6 @@
 //! `planish run`: process files, once.
 
-use super::Exit;
+use super::{Exit, shown};
 use crate::inputs;
 use crate::job::{Done, Job, Stage};
 use crate::outcome::Status;
@@ -20,6 +20,7 @@ use std::time::Duration;
 pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     let out = settings.out.as_deref().ok_or("no output folder: give --out DIR (or out = \"DIR\" in planish.toml)")?;
     let jobs = inputs::collect(paths)?;
+    inputs::refuse_same_names(&jobs)?;
     inputs::refuse_inside(&jobs, out)?;
     let publisher = Publisher::open(out)?;
     let progress = progress(jobs.len(), settings.quiet);
@@ -31,10 +32,10 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     }
     progress.finish_and_clear();
     if !settings.quiet {
-        println!("{}", table(&rows));
+        super::say(&table(&rows).to_string());
     }
     for (job, result) in &rows {
-        tell_trouble(job, result, settings.quiet);
+        tell_trouble(job, result);
     }
     let good = rows.iter().all(|(_, r)| r.as_ref().is_ok_and(|d| d.report.status == Status::Certified));
     Ok(if good { Exit::Success } else { Exit::Refused })
@@ -64,7 +65,7 @@ fn table<E>(rows: &[Row<E>]) -> Table {
         }
     }
     for (job, result) in rows {
-        let name = job.name.to_string_lossy().escape_debug().to_string();
+        let name = shown(job.name.as_ref());
         match result {
             Ok(done) => table.add_row(cells(name, done)),
             Err(_) => table.add_row(vec![name, "not written".to_owned()]),
@@ -96,12 +97,13 @@ fn cells(name: String, done: &Done) -> Vec<String> {
 }
 
 /// Says on standard error what was wrong with an input.
-fn tell_trouble<E: std::fmt::Display>(job: &Job, result: &Result<Done, E>, quiet: bool) {
+fn tell_trouble<E: std::fmt::Display>(job: &Job, result: &Result<Done, E>) {
+    let input = shown(&job.path);
     match result {
-        Err(error) => eprintln!("planish: {}: {error}", job.path.display()),
-        Ok(Done { report: Report { reason: Some(reason), status, .. }, .. }) if !quiet => {
+        Err(error) => eprintln!("planish: {input}: {error}"),
+        Ok(Done { report: Report { reason: Some(reason), status, .. }, .. }) => {
             let place = reason.place.as_ref().map_or(String::new(), |p| format!(" ({p})"));
-            eprintln!("planish: {}: {status}: {}{place} [{}]", job.path.display(), reason.message, reason.code.name());
+            eprintln!("planish: {input}: {status}: {}{place} [{}]", reason.message, reason.code.name());
         }
         Ok(_) => {}
     }

@@ -63,7 +63,10 @@ impl SurfaceMesh {
 
     /// The total true area, in the unit of the input, squared.
     pub fn area(&self) -> f64 {
-        (0..self.triangles.len()).map(|f| triangle_area(self.corners(f))).sum()
+        // Products of coordinates may overflow or underflow where the area itself does not.
+        let scale = self.metric.scale;
+        let scaled = |f: usize| triangle_area(self.corners(f).map(|p| p.map(|c| c * scale)));
+        (0..self.triangles.len()).map(scaled).sum::<f64>() / scale / scale
     }
 
     /// The smallest box around the surface.

@@ -1,50 +1,102 @@
 //! Closing cracks: open edges that should be one edge.
 //!
-//! Two open edges are joined when both pairs of ends lie within the tolerance, and their triangles continue each
-//! other. Facing sheets (the walls of a thin gap, folded onto each other) are never joined, nor two vertices of
-//! one triangle, so that welding cannot change what the surface is.
+//! Open edges whose ends lie within the tolerance of each other, pair by pair, form a bundle. A bundle in which no
+//! two triangles face each other becomes one edge, whether two sheets meet there or more, so that noise cannot
+//! decide who is joined with whom. Facing sheets (the walls of a thin gap, one upon the other) are never joined; in
+//! a bundle that holds some, each edge is joined with the nearest one that it does not face. No two vertices of
+//! one triangle are ever joined. Edges shorter than the tolerance have no direction of their own: they are zipped up
+//! from ends that are joined already.
 
 use super::open_half_edges;
 use crate::id::{HalfEdgeId, VertexId};
 use crate::mesh::EdgeTable;
-use crate::space::{Vec3, distance, dot, norm, sub};
+use crate::space::{Vec3, distance, dot, midpoint, norm, sub};
 use crate::union_find::UnionFind;
 
 /// Triangles on the same side of an edge within this angle (10 degrees) face each other: the cosine.
 const FACING: f64 = 0.985;
 
+/// Tolerances below this share of the largest coordinate are rounding: nothing is joined.
+const ROUNDING: f64 = 1e-15;
+
 /// What is to be joined.
 pub(super) struct Closed {
     /// Per vertex, the vertex that takes its place.
     pub target: Vec<VertexId>,
-    /// How many pairs of open edges become one.
+    /// How many open edges were joined to another one.
     pub pairs: usize,
 }
 
 /// Two open edges that may be joined, the ends in the order in which they meet.
 struct Candidate {
     gap: f64,
-    edges: [HalfEdgeId; 2],
+    /// Positions among the open edges.
+    edges: [usize; 2],
     ends: [[VertexId; 2]; 2],
+    facing: bool,
 }
 
-/// Finds the cracks no wider than `tolerance`, nearest pairs first; each edge is joined at most once.
+/// Finds the cracks no wider than `tolerance`.
 pub(super) fn find(points: &[Vec3], triangles: &[[VertexId; 3]], edges: &EdgeTable, tolerance: f64) -> Closed {
-    let rim = Rim { points, triangles, tolerance, open: open_half_edges(edges, triangles.len()) };
-    let mut candidates = rim.candidates();
-    candidates.sort_by(|a, b| a.gap.total_cmp(&b.gap).then(a.edges.cmp(&b.edges)));
+    let open = open_half_edges(edges, triangles.len());
+    let rim = Rim { points, triangles, tolerance, open };
     let mut joiner = Joiner::new(&rim);
-    let mut taken = vec![false; 3 * triangles.len()];
+    let largest = points.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
     let mut pairs = 0;
-    for c in &candidates {
-        let free = !c.edges.iter().any(|h| taken[h.index()]);
-        if free && joiner.join(c.ends) {
-            c.edges.iter().for_each(|h| taken[h.index()] = true);
-            pairs += 1;
-        }
+    if tolerance > ROUNDING * largest {
+        let mut candidates = rim.candidates();
+        candidates.sort_by(|a, b| a.gap.total_cmp(&b.gap).then(a.edges.cmp(&b.edges)));
+        pairs = join_bundles(&rim, &candidates, &mut joiner) + zip_short_edges(&rim, &mut joiner);
     }
     let target = (0..points.len()).map(|v| VertexId::at(joiner.sets.find(v))).collect();
     Closed { target, pairs }
+}
+
+/// Joins bundle by bundle; how many edges were joined to another one.
+fn join_bundles(rim: &Rim, candidates: &[Candidate], joiner: &mut Joiner) -> usize {
+    let mut bundles = UnionFind::new(rim.open.len());
+    candidates.iter().for_each(|c| {
+        bundles.unite(c.edges[0], c.edges[1]);
+    });
+    let mut has_facing = vec![false; rim.open.len()];
+    candidates.iter().filter(|c| c.facing).for_each(|c| has_facing[bundles.find(c.edges[0])] = true);
+    let mut joined = UnionFind::new(rim.open.len());
+    let mut taken = vec![false; rim.open.len()];
+    let mut pairs = 0;
+    for c in candidates.iter().filter(|c| !c.facing) {
+        let [g, h] = c.edges;
+        let single = has_facing[bundles.find(g)];
+        let free = !(single && (taken[g] || taken[h])) && joined.find(g) != joined.find(h);
+        if free && joiner.join(c.ends) {
+            joined.unite(g, h);
+            (taken[g], taken[h]) = (true, true);
+            pairs += 1;
+        }
+    }
+    pairs
+}
+
+/// Joins open edges below the tolerance that begin at the same (joined) vertex, run the same way and end within the
+/// tolerance of each other; how many were. Every round but the last joins vertices, so the rounds end.
+fn zip_short_edges(rim: &Rim, joiner: &mut Joiner) -> usize {
+    let short: Vec<[VertexId; 2]> = rim.open.iter().filter(|h| !rim.is_long(**h)).map(|h| rim.ends(*h)).collect();
+    let mut pairs = 0;
+    loop {
+        let arm = |joiner: &mut Joiner, a: VertexId, b: VertexId| (joiner.sets.find(a.index()), a, b);
+        let mut arms: Vec<_> = short.iter().flat_map(|[a, b]| [arm(joiner, *a, *b), arm(joiner, *b, *a)]).collect();
+        arms.sort_unstable();
+        let before = pairs;
+        for pair in arms.windows(2).filter(|w| w[0].0 == w[1].0 && rim.run_alike(w)) {
+            let (a, b) = (pair[0].2, pair[1].2);
+            let apart = joiner.sets.find(a.index()) != joiner.sets.find(b.index());
+            if apart && rim.gap(a, b) <= rim.tolerance && joiner.join([[a, b], [a, b]]) {
+                pairs += 1;
+            }
+        }
+        if pairs == before {
+            return pairs;
+        }
+    }
 }
 
 /// The open edges of a draft.
@@ -65,62 +117,55 @@ impl Rim<'_> {
         self.points[v.index()]
     }
 
-    /// All pairs of open edges within the tolerance. An edge no longer than the tolerance has no direction of
-    /// its own: it follows its neighbours.
+    fn gap(&self, a: VertexId, b: VertexId) -> f64 {
+        distance(self.position(a), self.position(b))
+    }
+
+    /// Whether two arms (joined vertex, own vertex, far end) leave the joined vertex in the same direction, rather
+    /// than being neighbours along one rim.
+    fn run_alike(&self, arms: &[(usize, VertexId, VertexId)]) -> bool {
+        let [u, v] = [0, 1].map(|k| sub(self.position(arms[k].2), self.position(arms[k].1)));
+        dot(u, v) > 0.0
+    }
+
+    fn is_long(&self, h: HalfEdgeId) -> bool {
+        let [a, b] = self.ends(h);
+        self.gap(a, b) > self.tolerance
+    }
+
+    /// All pairs of long open edges within the tolerance: their middles are, then, too.
     fn candidates(&self) -> Vec<Candidate> {
-        let long = |h: &HalfEdgeId| {
-            let [a, b] = self.ends(*h);
-            distance(self.position(a), self.position(b)) > self.tolerance
-        };
-        let open: Vec<HalfEdgeId> = self.open.iter().copied().filter(long).collect();
-        let by_cell = self.sorted_by_cell(&open);
+        let long = (0..self.open.len()).filter(|i| self.is_long(self.open[*i]));
+        let mut cells: Vec<([i64; 3], usize)> = long.map(|i| (self.cell(i), i)).collect();
+        cells.sort_unstable();
         let mut found = Vec::new();
-        if self.tolerance > 0.0 {
-            for &g in &open {
-                let near = self.near(&by_cell, self.ends(g)[0]);
+        for &([x, y, z], g) in &cells {
+            for (i, j) in (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j))) {
+                let (low, high) = ([x + i, y + j, z - 1], [x + i, y + j, z + 1]);
+                let start = cells.partition_point(|(cell, _)| *cell < low);
+                let near = cells[start..].iter().take_while(|(cell, _)| *cell <= high).map(|(_, h)| *h);
                 found.extend(near.filter(|h| *h > g).filter_map(|h| self.candidate(g, h)));
             }
         }
         found
     }
 
-    /// The cell of a vertex: cubes with sides of the tolerance.
-    fn cell(&self, v: VertexId) -> [i64; 3] {
-        self.position(v).map(|c| (c / self.tolerance).floor() as i64)
+    /// The cell in which the middle of an open edge lies: cubes with sides of the tolerance.
+    fn cell(&self, i: usize) -> [i64; 3] {
+        let [a, b] = self.ends(self.open[i]).map(|v| self.position(v));
+        midpoint(a, b).map(|c| (c / self.tolerance).floor() as i64)
     }
 
-    /// Every end of every open edge, sorted by the cell it lies in.
-    fn sorted_by_cell(&self, open: &[HalfEdgeId]) -> Vec<([i64; 3], HalfEdgeId)> {
-        let mut cells: Vec<_> = open.iter().flat_map(|h| self.ends(*h).map(|v| (self.cell(v), *h))).collect();
-        cells.sort_unstable();
-        cells
-    }
-
-    /// The open edges with an end in a cell at or beside that of `v`, each once.
-    fn near(&self, by_cell: &[([i64; 3], HalfEdgeId)], v: VertexId) -> impl Iterator<Item = HalfEdgeId> {
-        let [x, y, z] = self.cell(v);
-        let mut found = Vec::new();
-        for (i, j) in (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j))) {
-            let column = [x.saturating_add(i), y.saturating_add(j)];
-            let (low, high) =
-                ([column[0], column[1], z.saturating_sub(1)], [column[0], column[1], z.saturating_add(1)]);
-            let start = by_cell.partition_point(|(cell, _)| *cell < low);
-            found.extend(by_cell[start..].iter().take_while(|(cell, _)| *cell <= high).map(|(_, h)| *h));
-        }
-        found.sort_unstable();
-        found.dedup();
-        found.into_iter()
-    }
-
-    /// The pair `g`, `h`, where it is a crack.
-    fn candidate(&self, g: HalfEdgeId, h: HalfEdgeId) -> Option<Candidate> {
-        let ([a, b], [c, d]) = (self.ends(g), self.ends(h));
-        let gap = |p, q| distance(self.position(p), self.position(q));
+    /// The pair of the open edges `g`, `h`, where their ends meet.
+    fn candidate(&self, g: usize, h: usize) -> Option<Candidate> {
+        let edges = [self.open[g], self.open[h]];
+        let [[a, b], [c, d]] = edges.map(|e| self.ends(e));
         let ways = [[[a, d], [b, c]], [[a, c], [b, d]]];
-        let widths = ways.map(|w| gap(w[0][0], w[0][1]).max(gap(w[1][0], w[1][1])));
+        let widths = ways.map(|w| self.gap(w[0][0], w[0][1]).max(self.gap(w[1][0], w[1][1])));
         let best = usize::from(widths[1] < widths[0]);
-        let fits = widths[best] <= self.tolerance && g.face() != h.face() && !self.facing(g, h);
-        fits.then(|| Candidate { gap: widths[best], edges: [g, h], ends: ways[best] })
+        let fits = widths[best] <= self.tolerance && edges[0].face() != edges[1].face();
+        let facing = fits && self.facing(edges[0], edges[1]);
+        fits.then_some(Candidate { gap: widths[best], edges: [g, h], ends: ways[best], facing })
     }
 
     /// Whether the triangles at `g` and `h` lie on the same side of the edge, one upon the other.

@@ -166,7 +166,10 @@ impl Draft {
     fn close_cracks(&mut self, weld: f64, report: &mut Report) {
         let edges = EdgeTable::new(&self.triangles);
         let Some(diagonal) = BoundingBox::of(self.used_points()).map(|b| b.diagonal()) else { return };
-        let closed = cracks::find(&self.points, &self.triangles, &edges, weld * diagonal);
+        // Powers of two change no digit: distances are measured where they neither overflow nor underflow.
+        let scale = unit_scale(diagonal);
+        let scaled: Vec<Vec3> = self.points.iter().map(|p| p.map(|c| c * scale)).collect();
+        let closed = cracks::find(&scaled, &self.triangles, &edges, weld * diagonal * scale);
         report.cracks_closed = closed.pairs;
         if closed.pairs == 0 {
             return;

@@ -130,3 +130,77 @@ fn what_cannot_be_oriented_is_left_as_it_is() {
     let got = repaired(&shapes::moebius(9));
     assert_eq!((got.report.flipped_triangles.count, got.mesh.census().orientable), (0, false));
 }
+
+/// Sheets of n squares that meet in the line x = y = 0, each with its own noise.
+fn sheets(directions: &[[f64; 2]], n: u32, noise: f64) -> TriangleSoup {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for (k, [x, y]) in directions.iter().enumerate() {
+        let base = points.len() as u32;
+        for i in 0..=n {
+            let wobble = noise * f64::from((i * 7 + 3 * k as u32) % 5);
+            points.push([wobble, -wobble, f64::from(i) / f64::from(n)]);
+            points.push([*x, *y, f64::from(i) / f64::from(n)]);
+        }
+        for a in (0..n).map(|i| base + 2 * i) {
+            triangles.extend([[a, a + 1, a + 3], [a, a + 3, a + 2]]);
+        }
+    }
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn where_three_sheets_meet_noise_decides_nothing() {
+    for noise in [0.0, 1e-8, 1e-7, 2e-7] {
+        let got = repaired(&sheets(&[[1.0, 0.0], [-1.0, 0.2], [0.0, 1.0]], 8, noise));
+        let census = got.mesh.census();
+        assert_eq!((census.nonmanifold_edges, census.components), (8, 3), "noise {noise}");
+        assert!(!census.is_one_chart());
+    }
+}
+
+#[test]
+fn two_sheets_become_one_and_walls_beside_them_stay() {
+    let two = repaired(&sheets(&[[1.0, 0.0], [-1.0, 0.3]], 8, 2e-7));
+    assert!(two.report.cracks_closed == 8 && two.mesh.census().is_one_chart());
+    let folded = repaired(&sheets(&[[1.0, 0.0], [1.0, 0.01]], 8, 2e-7));
+    assert_eq!((folded.report.cracks_closed, folded.mesh.census().components), (0, 2));
+}
+
+#[test]
+fn chains_of_edges_shorter_than_the_tolerance_are_zipped_up() {
+    // A unit square cut along its diagonal; in the middle of the cut three edges of 3e-7.
+    let along = [0.0, 0.5, 0.5 + 3e-7, 0.5 + 6e-7, 1.0];
+    let mut points = Vec::new();
+    let mut triangles = Vec::new();
+    for (side, gap) in [(0.0, 0.0), (1.0, 2e-7)] {
+        let base = points.len() as u32;
+        points.extend(along.map(|t| [t, t, gap]));
+        points.push([1.0 - side, side, 0.0]);
+        for i in (0..4).map(|i| base + i) {
+            triangles.push(if side == 0.0 { [i, base + 5, i + 1] } else { [i, i + 1, base + 5] });
+        }
+    }
+    let got = repaired(&TriangleSoup::new(points, triangles).expect("sound"));
+    assert_eq!((got.mesh.census().boundary_loops, got.mesh.census().components), (1, 1), "{:?}", got.report);
+}
+
+#[test]
+fn a_vertex_with_many_open_edges_and_a_tiny_tolerance_cost_little() {
+    let n = 40_000;
+    let rim = (0..2 * n).map(|i| (f64::from(i) * 1e-3).sin_cos()).map(|(s, c)| [c, s, 1.0 + s * c]);
+    let points = std::iter::once([0.0; 3]).chain(rim).collect();
+    let fans = (0..n as u32).map(|i| [0, 2 * i + 1, 2 * i + 2]).collect();
+    let soup = TriangleSoup::new(points, fans).expect("sound");
+    for weld in [1e-6, 1e-20] {
+        assert_eq!(repair(&soup, &Settings { weld }).expect("a surface").raw.triangles, n as usize);
+    }
+}
+
+#[test]
+fn the_area_of_huge_and_tiny_surfaces_is_finite() {
+    for (scale, area) in [(1e99, 0.5e198), (1e-90, 0.5e-180)] {
+        let points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[x, y]| [x * scale, y * scale, 0.0]).to_vec();
+        let got = repaired(&TriangleSoup::new(points, vec![[0, 1, 2]]).expect("sound"));
+        assert!((got.mesh.area() / area - 1.0).abs() < 1e-12);
+    }
+}
