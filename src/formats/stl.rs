@@ -332,7 +332,8 @@ mod tests {
             format!("  \n\tSOLID one\n{}ENDSOLID one\nsolid two\n{}endsolid", facet("0").to_uppercase(), facet("2"));
         let soup = read(file.as_bytes()).expect("two solids");
         assert_eq!((soup.triangles().len(), soup.points()[3]), (2, [2.0, 0.0, 0.0]));
-        let layouts: [(&str, fn(&str) -> String); 4] = [
+        type Layout = fn(&str) -> String;
+        let layouts: [(&str, Layout); 4] = [
             ("on one line", |f| f.replace('\n', " ")),
             ("with carriage returns", |f| f.replace('\n', "\r")),
             ("with a byte order mark", |f| format!("\u{feff}{f}")),

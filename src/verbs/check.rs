@@ -8,7 +8,7 @@
 use super::{Exit, say, shown};
 use crate::formats::vtu::{self, Grid};
 use crate::job::{guard, read_file};
-use crate::outcome::{Code, Reason, Status};
+use crate::outcome::{Reason, Status};
 use crate::report::{self, ChartReport, Report, certificate, chart_checksum};
 use pipeline::certify::{self, PlanarMap, prove};
 use pipeline::grid::GridPoint;
