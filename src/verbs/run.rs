@@ -91,7 +91,7 @@ fn cells(name: String, done: &Done) -> Vec<String> {
         some(report.charts.len()),
         some(invalid),
         methods.join(", "),
-        ratio.map_or(String::new(), |r| format!("{r:.3e}")),
+        ratio.map_or(String::new(), |r| if r < 1e4 { format!("{r:.1}") } else { format!("{r:.1e}") }),
         format!("{:.2}", report.timing.values().sum::<f64>()),
     ]
 }
