@@ -96,13 +96,12 @@ pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
     };
     let mut invalid = vec![false; closed.own_triangles()];
     map.invalid().iter().for_each(|f| invalid[f.index()] = true);
-    let found = Harmonic { invalid, det_min: least_det(&closed, map.nodes()) };
+    let found = Harmonic { invalid, det_min: least_det(&closed, &map) };
     let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &start, &map);
     let certified = match prove(planar(&closed, &nodes, hole_centres)) {
         Ok(certified) => certified,
         Err(_) => {
-            report.method = untangle::Method::Start;
-            report.energy = report.energy_start;
+            report = report.of_start(&closed, &start, &map);
             base.certified
         }
     };

@@ -51,6 +51,7 @@ pub mod bernstein;
 pub mod closed;
 pub mod element;
 pub mod grid;
+mod jacobian;
 pub mod mesh;
 pub mod shapes;
 pub mod sparse;

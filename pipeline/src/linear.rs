@@ -104,8 +104,7 @@ impl LinearMap {
 /// [`Error::Folded`] when the chart must be split; [`Error::Solver`].
 pub fn linear_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap, Error> {
     let harmonic = weights::harmonic(chart);
-    let places = solve_symmetric(chart, boundary, &harmonic)?;
-    let mut folds = folded(chart, &places);
+    let (places, mut folds) = attempt(chart, boundary, &harmonic)?;
     let count = folds.len();
     if count == 0 {
         return Ok(LinearMap { places, folded: 0, edges_changed: 0, method: Method::Harmonic });
@@ -119,8 +118,8 @@ pub fn linear_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap,
         }
         let pick = |e: usize| if changed[e] { raised[e] } else { harmonic[e] };
         let mixed: Vec<f64> = (0..harmonic.len()).map(pick).collect();
-        let places = solve_symmetric(chart, boundary, &mixed)?;
-        folds = folded(chart, &places);
+        let places;
+        (places, folds) = attempt(chart, boundary, &mixed)?;
         if folds.is_empty() {
             let edges_changed = changed.iter().filter(|c| **c).count();
             return Ok(LinearMap { places, folded: count, edges_changed, method: Method::MMatrix });
@@ -128,6 +127,21 @@ pub fn linear_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap,
     }
     let map = mean_value_map(chart, boundary)?;
     Ok(LinearMap { folded: count, ..map })
+}
+
+/// The places by symmetric weights and the triangles folded there: all of them, where the matrix is not positive
+/// definite in doubles.
+fn attempt(chart: &ClosedChart, boundary: &Boundary, weights: &[f64]) -> Result<(Vec<GridPoint>, Vec<FaceId>), Error> {
+    match solve_symmetric(chart, boundary, weights) {
+        Ok(places) => {
+            let folds = folded(chart, &places);
+            Ok((places, folds))
+        }
+        Err(Error::Solver(sparse::Error::Singular { .. })) => {
+            Ok((Vec::new(), (0..chart.triangles().len()).map(FaceId::at).collect()))
+        }
+        Err(error) => Err(error),
+    }
 }
 
 /// The map by mean value weights.
@@ -267,18 +281,23 @@ pub fn lower_ears(chart: &ClosedChart, linear: &LinearMap, boundary: &mut Bounda
     /// The least coefficient that is left alone, relative to that of the straight triangle.
     const MARGIN: f64 = 0.01;
     let mut nodes = linear.raised(chart, boundary);
-    for (i, h) in chart.outer().iter().enumerate() {
+    // The edges of one triangle are lowered together, so that no order of them decides.
+    let mut edges: Vec<(usize, usize)> = chart.outer().iter().map(|h| h.face().index()).zip(0..).collect();
+    edges.sort_unstable();
+    for ear in edges.chunk_by(|a, b| a.0 == b.0) {
+        let face = ear[0].0;
+        let [p, q, r] = chart.triangles()[face].map(|v| linear.places[v.index()]);
+        let straight = 2.0 * orientation(p, q, r) as f64;
         for all_the_way in [false, true] {
-            let face = h.face().index();
             let det = crate::bernstein::ExactDet::new(chart.nodes(face).map(|n| nodes[n]));
-            let [p, q, r] = chart.triangles()[face].map(|v| linear.places[v.index()]);
-            let straight = 2.0 * orientation(p, q, r) as f64;
             let least = det.corner.iter().chain(&det.edge).fold(f64::INFINITY, |m, c| m.min(*c as f64));
             if least > MARGIN * straight {
                 break;
             }
-            boundary.lower(i, all_the_way);
-            nodes[chart.mid_node(*h)] = boundary.mids()[i];
+            for (_, i) in ear {
+                boundary.lower(*i, all_the_way);
+                nodes[chart.mid_node(chart.outer()[*i])] = boundary.mids()[*i];
+            }
         }
     }
 }
@@ -305,7 +324,7 @@ mod tests {
         let shapes = [
             shapes::disk(8),
             shapes::disk_with_holes(17, 3),
-            shapes::bent_disk(12, 0.45),
+            shapes::bent_disk(12, 0.45, 1.0),
             shapes::folding_three(),
             shapes::folding_six(),
             shapes::sliver_strip(9),

@@ -11,18 +11,26 @@ use crate::closed::ClosedChart;
 use crate::element;
 use crate::grid::GridPoint;
 use crate::id::FaceId;
+use crate::jacobian::Corners;
 use crate::sparse::{self, PRESCRIBED, Pattern};
 
-/// The harmonic map by quadratic elements, on the grid, valid or not.
+/// The harmonic map by quadratic elements, valid or not.
 #[derive(Clone, Debug)]
 pub struct QuadraticMap {
+    places: Vec<[f64; 2]>,
     nodes: Vec<GridPoint>,
     invalid: Vec<FaceId>,
     energy: f64,
 }
 
 impl QuadraticMap {
-    /// The places of all nodes of the closed chart.
+    /// The places of all nodes of the closed chart, as they were solved for. They may lie far outside the disk: there
+    /// is no maximum principle for quadratic elements.
+    pub fn places(&self) -> &[[f64; 2]] {
+        &self.places
+    }
+
+    /// The places of all nodes of the closed chart, on the grid.
     pub fn nodes(&self) -> &[GridPoint] {
         &self.nodes
     }
@@ -63,8 +71,9 @@ pub fn quadratic_map(chart: &ClosedChart, boundary: &Boundary) -> Result<Quadrat
     }
     let nodes = to_grid(chart, &uv);
     let invalid = invalid_triangles(chart, &nodes);
-    let energy = energy(chart, &nodes);
-    Ok(QuadraticMap { nodes, invalid, energy })
+    // Of the solution itself: the grid ends not far outside the disk, and what was cut off there is no lower bound.
+    let energy = energy_of(chart, &uv);
+    Ok(QuadraticMap { places: uv, nodes, invalid, energy })
 }
 
 /// Solves both Laplace problems; returns the unknown values of u, then those of v.
@@ -111,18 +120,23 @@ pub(crate) fn invalid_triangles(chart: &ClosedChart, nodes: &[GridPoint]) -> Vec
     own.filter(|f| det(chart, nodes, *f).validity() == Validity::Invalid).map(FaceId::at).collect()
 }
 
-/// The least jacobian of a map over all triangles of the chart, per unit of mollified area of the triangle in
+/// The least jacobian of a harmonic map over all triangles of the chart, per unit of mollified area of the triangle in
 /// space, in the unit of the shapes.
-pub fn least_det(chart: &ClosedChart, nodes: &[GridPoint]) -> f64 {
-    let relative =
-        |f: usize| bernstein::range(det(chart, nodes, f).coefficients()).0 / (2.0 * chart.shapes()[f].area());
+pub fn least_det(chart: &ClosedChart, map: &QuadraticMap) -> f64 {
+    let relative = |f: usize| {
+        let dets = Corners::new(&chart.nodes(f).map(|n| map.places[n])).dets();
+        bernstein::range(dets).0 / (2.0 * chart.shapes()[f].area())
+    };
     (0..chart.own_triangles()).map(relative).fold(f64::INFINITY, f64::min)
 }
 
 /// The Dirichlet energy of a map of the closed chart, fans included.
 pub fn energy(chart: &ClosedChart, nodes: &[GridPoint]) -> f64 {
-    let one =
-        |f: usize| element::energy(&element::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| nodes[n].uv()));
+    energy_of(chart, &nodes.iter().map(|p| p.uv()).collect::<Vec<_>>())
+}
+
+fn energy_of(chart: &ClosedChart, places: &[[f64; 2]]) -> f64 {
+    let one = |f: usize| element::energy(&element::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| places[n]));
     (0..chart.triangles().len()).map(one).sum()
 }
 

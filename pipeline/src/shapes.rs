@@ -50,18 +50,18 @@ pub fn flat_disk(rings: u32) -> TriangleSoup {
 }
 
 /// A disk that is strongly bent out of the plane over irregular points: z = 2.5 sin(3x+1) cos(4y) + 0.75 sin 9x
-/// sin 7y. Its harmonic P2 map has many invalid triangles. `jitter` (0 to 0.5) moves points inside by that share
-/// of the ring distance.
-pub fn bent_disk(rings: u32, jitter: f64) -> TriangleSoup {
+/// sin 7y, times `height`. Its harmonic P2 map has many invalid triangles. `jitter` (0 to 0.5) moves points inside
+/// by that share of the ring distance.
+pub fn bent_disk(rings: u32, jitter: f64, height: f64) -> TriangleSoup {
     let (mut points, triangles) = ring_disk(rings);
     let mut random = Random(12345);
     let inside = points.len() - 6 * rings as usize;
     for p in points.iter_mut().take(inside) {
         *p = p.map(|c| c + jitter / f64::from(rings) * random.symmetric());
     }
-    let height =
+    let bump =
         |x: f64, y: f64| 2.5 * (3.0 * x + 1.0).sin() * (4.0 * y).cos() + 0.75 * (9.0 * x).sin() * (7.0 * y).sin();
-    soup(points.iter().map(|[x, y]| [*x, *y, height(*x, *y)]).collect(), triangles)
+    soup(points.iter().map(|[x, y]| [*x, *y, height * bump(*x, *y)]).collect(), triangles)
 }
 
 /// A square plate of `n` x `n` squares with a row of `holes` square holes, gently curved. `n` is at least
@@ -248,7 +248,7 @@ mod tests {
         };
         check(disk(4), 1, 1, Some(0), true);
         check(flat_disk(3), 1, 1, Some(0), true);
-        check(bent_disk(10, 0.3), 1, 1, Some(0), true);
+        check(bent_disk(10, 0.3, 1.0), 1, 1, Some(0), true);
         check(disk_with_holes(17, 3), 1, 4, Some(0), true);
         check(floater_five(), 1, 1, Some(0), true);
         check(folding_three(), 1, 1, Some(0), true);

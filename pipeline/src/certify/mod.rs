@@ -82,6 +82,18 @@ pub enum Error {
     /// The cells are no surface with boundary.
     #[error(transparent)]
     Incidence(#[from] IncidenceError),
+    /// A node is too far away, or no double.
+    #[error("node {node} lies beyond 2, or its coordinates are no doubles")]
+    Inexact {
+        /// The node.
+        node: u32,
+    },
+    /// The centre of a hole is too far away, or no double.
+    #[error("the centre of hole {hole} lies beyond 2, or its coordinates are no doubles")]
+    InexactCentre {
+        /// Its place among the given centres.
+        hole: usize,
+    },
     /// A vertex is off the grid on which midpoints are exact.
     #[error("vertex node {node} is no multiple of 2^-52")]
     OffGrid {
@@ -122,6 +134,7 @@ pub enum Error {
 /// The first part of the theorem's premises that fails, with its evidence.
 pub fn prove(map: PlanarMap) -> Result<CertifiedMap, Error> {
     let loops = incidence::boundary_loops(&map.cells, map.nodes.len())?;
+    refuse_inexact(&map)?;
     let vertices = map.cells.iter().flat_map(|c| &c[..3]);
     if let Some(node) = vertices.copied().find(|n| !map.nodes[*n as usize].is_vertex()) {
         return Err(Error::OffGrid { node });
@@ -138,6 +151,18 @@ pub fn prove(map: PlanarMap) -> Result<CertifiedMap, Error> {
         certificate.hole_centres.push(*seen_from.ok_or(Error::Hole { node: loops[i][0][0], centres })?);
     }
     Ok(CertifiedMap { map, certificate })
+}
+
+/// Everything is proven of the doubles that are written: every point must be one. This also bounds the integers.
+fn refuse_inexact(map: &PlanarMap) -> Result<(), Error> {
+    let exact = |p: &GridPoint| GridPoint::exact(p.uv()) == Some(*p);
+    if let Some(node) = map.cells.iter().flatten().copied().find(|n| !exact(&map.nodes[*n as usize])) {
+        return Err(Error::Inexact { node });
+    }
+    match map.hole_centres.iter().position(|c| !exact(c)) {
+        Some(hole) => Err(Error::InexactCentre { hole }),
+        None => Ok(()),
+    }
 }
 
 /// Premise (b).

@@ -122,3 +122,15 @@ fn the_centre_of_a_star_is_found_where_there_is_one() {
     }
     assert_eq!(star_centre(&dented, far), None);
 }
+
+#[test]
+fn points_that_are_no_doubles_or_far_away_are_refused_before_any_arithmetic() {
+    for x in [i64::MAX - 1, 1 << 58, (1 << 53) + 1, i64::MIN] {
+        let mut map = ring(12, 0.4, [0.0, 0.0]);
+        map.nodes[2].x = x;
+        assert_eq!(prove(map).map(|_| ()), Err(Error::Inexact { node: 2 }), "{x}");
+        let mut map = ring(12, 0.4, [0.0, 0.0]);
+        map.hole_centres[0].y = x;
+        assert_eq!(prove(map).map(|_| ()), Err(Error::InexactCentre { hole: 0 }), "{x}");
+    }
+}

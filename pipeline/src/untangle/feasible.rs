@@ -11,8 +11,9 @@ use crate::sparse::Error;
 /// The weights of the barrier, relative to the energy of each triangle.
 const WEIGHTS: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 
-/// Newton steps per weight.
-const STEPS: usize = 12;
+/// Newton steps per weight, on large and on small charts, and the triangles times steps that decide between.
+const STEPS: [usize; 2] = [12, 60];
+const WORK: usize = 120_000;
 
 /// A weight is left when the promised decrease falls below this share of the energy.
 const TOLERANCE: f64 = 1e-9;
@@ -60,11 +61,12 @@ fn descend(problem: &mut Problem, x: &mut super::Places, effort: &mut Effort) ->
     }
     let pattern = problem.pattern();
     let analysis = pattern.analyse()?;
+    let steps = (WORK / problem.cells.len()).clamp(STEPS[0], STEPS[1]);
     let mut last = 1.0;
     for weight in WEIGHTS {
         problem.scale_weights(weight / last);
         last = weight;
-        effort.add(minimise(problem, (&pattern, &analysis), x, Penalty::Barrier, (STEPS, TOLERANCE))?);
+        effort.add(minimise(problem, (&pattern, &analysis), x, Penalty::Barrier, (steps, TOLERANCE))?);
     }
     Ok(())
 }

@@ -33,7 +33,7 @@ use crate::quadratic::{self, QuadraticMap, energy, invalid_triangles};
 use problem::Places;
 
 /// Above this share of invalid triangles the feasible path is taken at once.
-const FEW: f64 = 0.05;
+const FEW: f64 = 0.1;
 
 /// How the result was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,8 +64,20 @@ pub struct Report {
     /// Dirichlet energy of the result.
     pub energy: f64,
     /// The gradient of the last barrier problem in the norm of its inverse Hessian, relative to the root of twice
-    /// the energy; the largest over all patches.
+    /// the energy; the largest over all patches. Zero where nothing was minimised.
     pub gradient_norm: f64,
+}
+
+impl Report {
+    /// The report where the start itself is the result.
+    pub(crate) fn of_start(self, chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap) -> Self {
+        let nodes_moved = nodes_moved(chart, start, harmonic);
+        Self { method: Method::Start, nodes_moved, energy: self.energy_start, gradient_norm: 0.0, ..self }
+    }
+}
+
+fn nodes_moved(chart: &ClosedChart, nodes: &[GridPoint], harmonic: &QuadraticMap) -> usize {
+    (0..chart.own_nodes()).filter(|n| nodes[*n] != harmonic.nodes()[*n]).count()
 }
 
 /// A map with a point in each hole, believed to be valid: [`crate::certify`] decides.
@@ -102,11 +114,10 @@ impl Effort {
 pub fn untangle(chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap) -> Untangled {
     let mut effort = Effort::default();
     let (method, nodes, hole_centres) = best(chart, start, harmonic, &mut effort);
-    let moved = |n: &usize| nodes[*n] != harmonic.nodes()[*n];
     let report = Report {
         method,
         iterations: effort.iterations,
-        nodes_moved: (0..chart.own_nodes()).filter(moved).count(),
+        nodes_moved: nodes_moved(chart, &nodes, harmonic),
         energy_harmonic: harmonic.energy(),
         energy_start: energy(chart, start),
         energy: energy(chart, &nodes),
@@ -136,6 +147,7 @@ fn best(
     if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
         return (Method::Feasible, nodes.unwrap_or_default(), centres);
     }
+    effort.decrement = 0.0;
     let centres = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
     (Method::Start, start.to_vec(), centres)
 }

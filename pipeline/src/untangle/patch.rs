@@ -1,4 +1,8 @@
 //! The patch path: only a few rings around invalid triangles move.
+//!
+//! A patch begins between the harmonic map and the feasible start: like the start around the invalid triangles, and
+//! more and more like the harmonic map towards the rim. Begun at the harmonic map itself, triangles with all
+//! vertices on the outer loop come to rest while they are still inverted.
 
 use super::newton::minimise;
 use super::penalty::{Bound, Penalty};
@@ -44,6 +48,7 @@ pub(super) fn untangle(
 ) -> Option<Vec<GridPoint>> {
     let setting = Setting::new(chart, start);
     let mut nodes = harmonic.nodes().to_vec();
+    let mut x = harmonic.places().to_vec();
     for rings in RINGS {
         let centres: Vec<_> = (0..chart.loops().len()).map(|k| centre_of_hole(chart, &nodes, k)).collect();
         let seeds = seeds(chart, &nodes, &centres);
@@ -53,11 +58,14 @@ pub(super) fn untangle(
         let fallback = |k: usize| centres[k].unwrap_or(nodes[chart.centre_node(k)]);
         let centres: Vec<GridPoint> = (0..centres.len()).map(fallback).collect();
         let patches = region::patches(chart, &setting.stars, &seeds, rings);
-        if patches.iter().any(|p| p.len() as f64 > LARGEST * chart.own_triangles() as f64) {
+        if patches.parts.iter().any(|p| p.len() as f64 > LARGEST * chart.own_triangles() as f64) {
             return None;
         }
-        for faces in patches {
-            setting.solve(faces, &mut nodes, &centres, effort);
+        for faces in &patches.parts {
+            if let Some(solved) = setting.solve(faces, &patches.distance, rings, &x, &centres, effort) {
+                nodes = on_grid(chart, &solved);
+                x = solved;
+            }
         }
     }
     seeds(chart, &nodes, &vec![Some(GridPoint::default()); chart.loops().len()]).is_empty().then_some(nodes)
@@ -102,24 +110,53 @@ impl<'a> Setting<'a> {
         Self { chart, stars, density, start: places(start, &centres) }
     }
 
-    /// Untangles one patch; leaves `nodes` as they are where that fails.
-    fn solve(&self, faces: Vec<u32>, nodes: &mut [GridPoint], centres: &[GridPoint], effort: &mut Effort) {
-        let mut x = places(nodes, centres);
-        let mut problem = self.problem(&faces);
+    /// Untangles one patch of the map `x`: the places of all nodes and star centres, or nothing where that fails.
+    fn solve(
+        &self,
+        faces: &[u32],
+        distance: &[u32],
+        rings: usize,
+        x: &[[f64; 2]],
+        centres: &[GridPoint],
+        effort: &mut Effort,
+    ) -> Option<Places> {
+        let mut problem = self.problem(faces);
         if problem.unknowns() == 0 {
-            return;
+            return None;
         }
+        let mut x = x[..self.chart.node_count()].to_vec();
+        x.extend(centres.iter().map(|c| c.uv()));
+        self.blend(&mut x, &problem, faces, |v| 1.5 * (1.0 - f64::from(distance[v]) / rings as f64));
         let mut spent = Effort::default();
         let solved = relax(&mut problem, &mut x, &mut spent);
         effort.iterations += spent.iterations;
-        if solved.is_err() {
-            return;
-        }
+        solved.ok()?;
         let moved = on_grid(self.chart, &x);
-        let own = faces.iter().filter(|f| (**f as usize) < self.chart.own_triangles());
-        if own.into_iter().all(|f| det(self.chart, &moved, *f as usize).validity() != Validity::Invalid) {
+        let mut own = faces.iter().filter(|f| (**f as usize) < self.chart.own_triangles());
+        let valid = own.all(|f| det(self.chart, &moved, *f as usize).validity() != Validity::Invalid);
+        valid.then(|| {
             effort.merge(Effort { iterations: 0, ..spent });
-            nodes.copy_from_slice(&moved);
+            x
+        })
+    }
+
+    /// Moves free nodes towards the feasible start, by a share that `weight` gives for each vertex (cut to 0 and 1)
+    /// and that mid-edge nodes take from both ends.
+    fn blend(&self, x: &mut Places, problem: &Problem, faces: &[u32], weight: impl Fn(usize) -> f64) {
+        let own = self.chart.own_vertices();
+        let share = |v: crate::id::VertexId| if v.index() < own { weight(v.index()).clamp(0.0, 1.0) } else { 0.0 };
+        let mut shares = vec![0.0; x.len()];
+        for f in faces {
+            let nodes = self.chart.nodes(*f as usize);
+            let corner = self.chart.triangles()[*f as usize].map(share);
+            for k in 0..3 {
+                shares[nodes[k]] = corner[k];
+                shares[nodes[3 + k]] = 0.5 * (corner[k] + corner[(k + 1) % 3]);
+            }
+        }
+        for n in problem.free.iter().map(|n| *n as usize) {
+            let to = self.start[n];
+            x[n] = [0, 1].map(|k| x[n][k] + shares[n] * (to[k] - x[n][k]));
         }
     }
 

@@ -1,9 +1,10 @@
 //! The optimisation problem on a region of a chart: Dirichlet energy plus penalties, over the nodes that may move.
 
 use super::penalty::{Bound, Penalty, Value};
-use super::terms::{self, Corners, Form, Four, Six};
+use super::terms::{self, Form, Four};
 use crate::closed::ClosedChart;
 use crate::element;
+use crate::jacobian::{Corners, Six};
 use crate::sparse::{Error, PRESCRIBED, Pattern};
 
 /// The places of all nodes of a closed chart, followed by the star centre of each hole.

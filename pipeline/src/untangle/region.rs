@@ -34,20 +34,29 @@ impl Stars {
     }
 }
 
-/// The triangles within `rings` rings of the seeds, ascending, grouped into parts that share no vertex. Rings
-/// grow through vertices of the chart, not through the centres of fans.
-pub(super) fn patches(chart: &ClosedChart, stars: &Stars, seeds: &[u32], rings: usize) -> Vec<Vec<u32>> {
+/// Triangles around seeds, grouped into parts that share no vertex.
+pub(super) struct Patches {
+    /// The triangles of each part, ascending.
+    pub parts: Vec<Vec<u32>>,
+    /// Per vertex of the chart, how many rings away from the seeds it lies; the number of rings at the rim and beyond.
+    pub distance: Vec<u32>,
+}
+
+/// The triangles within `rings` rings of the seeds. Rings grow through vertices of the chart, not through the
+/// centres of fans.
+pub(super) fn patches(chart: &ClosedChart, stars: &Stars, seeds: &[u32], rings: usize) -> Patches {
     let mut inside = vec![false; chart.triangles().len()];
-    let mut reached = vec![false; chart.own_vertices()];
+    let mut distance = vec![rings as u32; chart.own_vertices()];
     let mut front: Vec<u32> = seeds.to_vec();
     seeds.iter().for_each(|f| inside[*f as usize] = true);
     let mut all = front.clone();
     let own = chart.own_vertices();
-    for _ in 0..rings {
+    for ring in 0..rings as u32 {
         let mut next = Vec::new();
         let vertices = front.iter().flat_map(|f| chart.triangles()[*f as usize]).filter(|v| v.index() < own);
         for v in vertices {
-            if !std::mem::replace(&mut reached[v.index()], true) {
+            if distance[v.index()] == rings as u32 {
+                distance[v.index()] = ring;
                 let new =
                     stars.around(v.index()).iter().filter(|f| !std::mem::replace(&mut inside[**f as usize], true));
                 next.extend(new.copied());
@@ -58,7 +67,7 @@ pub(super) fn patches(chart: &ClosedChart, stars: &Stars, seeds: &[u32], rings: 
     }
     all.sort_unstable();
     all.dedup();
-    components(chart, all)
+    Patches { parts: components(chart, all), distance }
 }
 
 fn components(chart: &ClosedChart, faces: Vec<u32>) -> Vec<Vec<u32>> {

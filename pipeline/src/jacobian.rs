@@ -1,0 +1,99 @@
+//! The jacobian determinant of a 6-node triangle in doubles: its Bernstein coefficients and their derivatives. What is
+//! decided is decided by [`crate::bernstein`], exactly; this serves optimisation and figures.
+
+use crate::element;
+use std::sync::LazyLock;
+
+/// Values at six nodes.
+pub(crate) type Six = [[f64; 2]; 6];
+
+/// The derivatives of the basis along xi and eta at the three corners.
+pub(crate) static AT_CORNERS: LazyLock<[[[f64; 2]; 6]; 3]> =
+    LazyLock::new(|| [0, 1, 2].map(|k| element::gradients(element::NODES[k])));
+
+/// The pairs of corners behind the six Bernstein coefficients M_00, M_11, M_22, M_01, M_12, M_20.
+pub(crate) const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];
+
+/// The determinant of two vectors of the plane.
+pub(crate) fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// The derivatives of a map at the three corners: along xi (a) and eta (b).
+pub(crate) struct Corners {
+    a: [[f64; 2]; 3],
+    b: [[f64; 2]; 3],
+}
+
+impl Corners {
+    /// Of nodal values `x`, taken relative to the first so that small triangles lose no digits.
+    pub fn new(x: &Six) -> Self {
+        let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
+        let along = |k: usize, dir: usize| {
+            let terms = |c: usize| (1..6).map(|n| AT_CORNERS[k][n][dir] * d[n][c]).sum::<f64>();
+            [terms(0), terms(1)]
+        };
+        Self { a: [0, 1, 2].map(|k| along(k, 0)), b: [0, 1, 2].map(|k| along(k, 1)) }
+    }
+
+    /// The six Bernstein coefficients of the jacobian determinant.
+    pub fn dets(&self) -> [f64; 6] {
+        PAIRS.map(|(i, j)| 0.5 * (cross(self.a[i], self.b[j]) + cross(self.a[j], self.b[i])))
+    }
+
+    /// What is linear in t in the coefficients of `self + t other`.
+    pub fn mixed(&self, other: &Self) -> [f64; 6] {
+        let one = |p: &Self, q: &Self, i: usize, j: usize| cross(p.a[i], q.b[j]);
+        PAIRS.map(|(i, j)| {
+            0.5 * (one(self, other, i, j) + one(other, self, i, j) + one(self, other, j, i) + one(other, self, j, i))
+        })
+    }
+
+    /// The gradient of coefficient `k` with respect to the twelve nodal values (u0, v0, u1, ...).
+    pub fn gradient(&self, k: usize) -> [f64; 12] {
+        let (i, j) = PAIRS[k];
+        let mut g = [0.0; 12];
+        for n in 0..6 {
+            for (p, q) in [(i, j), (j, i)] {
+                let (ga, gb) = (0.5 * AT_CORNERS[p][n][0], 0.5 * AT_CORNERS[q][n][1]);
+                g[2 * n] += ga * self.b[q][1] - gb * self.a[p][1];
+                g[2 * n + 1] += gb * self.a[p][0] - ga * self.b[q][0];
+            }
+        }
+        g
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const X: Six = [[0.0, 0.1], [1.0, 0.0], [0.2, 0.9], [0.5, -0.1], [0.7, 0.5], [0.1, 0.6]];
+    const Y: Six = [[0.3, 0.0], [-0.2, 0.1], [0.0, 0.4], [0.1, 0.2], [-0.3, 0.1], [0.2, -0.5]];
+
+    fn moved(t: f64) -> Six {
+        std::array::from_fn(|n| [X[n][0] + t * Y[n][0], X[n][1] + t * Y[n][1]])
+    }
+
+    #[test]
+    fn coefficients_are_those_of_the_exact_ones() {
+        use crate::grid::GridPoint;
+        let vertex = |n: usize| if n < 3 { GridPoint::vertex(X[n]) } else { GridPoint::mid(X[n]) };
+        let exact = crate::bernstein::ExactDet::new(std::array::from_fn(vertex)).coefficients();
+        for (a, b) in Corners::new(&X).dets().into_iter().zip(exact) {
+            assert!((a - b).abs() < 1e-14, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn coefficients_along_a_line_are_quadratic() {
+        let (x, y) = (Corners::new(&X), Corners::new(&Y));
+        for k in 0..6 {
+            let at = |t: f64| Corners::new(&moved(t)).dets()[k];
+            let quadratic = |t: f64| x.dets()[k] + t * x.mixed(&y)[k] + t * t * y.dets()[k];
+            assert!((at(0.7) - quadratic(0.7)).abs() < 1e-14);
+            let slope: f64 = (0..12).map(|i| x.gradient(k)[i] * Y[i / 2][i % 2]).sum();
+            assert!((slope - x.mixed(&y)[k]).abs() < 1e-14);
+        }
+    }
+}
