@@ -33,13 +33,14 @@ pub(super) fn untangle(chart: &ClosedChart, start: &[GridPoint], effort: &mut Ef
         cell.bounds = ((cell.face as usize) < chart.own_triangles()).then(|| [unset(weight); 6]);
     }
     problem.arcs = region::arc_cells(chart, |_| true, unset(energy));
-    problem.for_each_bound(&x, |c, bound| *bound = Bound { scale: c, floor: KEPT * c, weight: bound.weight });
+    problem
+        .for_each_bound(&x, |c, bound| *bound = Bound { scale: c, floor: KEPT * c, weight: bound.weight, dual: None });
     descend(&mut problem, &mut x, effort).ok()?;
     Some(on_grid(chart, &x))
 }
 
 fn unset(weight: f64) -> Bound {
-    Bound { scale: 1.0, floor: 0.0, weight }
+    Bound { scale: 1.0, floor: 0.0, weight, dual: None }
 }
 
 /// All triangles, without penalties yet; every node may move but those of the outer loop.

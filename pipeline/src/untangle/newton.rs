@@ -24,7 +24,7 @@ pub(super) struct Outcome {
 /// At most `most` steps, fewer where the promised decrease falls below `tolerance` (relative), or where rounding
 /// hides any decrease.
 pub(super) fn minimise(
-    problem: &Problem,
+    problem: &mut Problem,
     (pattern, analysis): (&Pattern, &Analysis),
     x: &mut Places,
     penalty: Penalty,
@@ -41,7 +41,11 @@ pub(super) fn minimise(
             break;
         }
         let direction = problem.direction(&step);
+        let from = matches!(penalty, Penalty::Barrier).then(|| x.clone());
         let Some(lower) = search(problem, x, &direction, penalty, objective, slope) else { break };
+        if let Some(from) = from {
+            problem.update_duals(&from, &direction, x);
+        }
         objective = lower;
         outcome.iterations += 1;
     }

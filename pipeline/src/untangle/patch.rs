@@ -165,11 +165,11 @@ impl<'a> Setting<'a> {
         let own = |f: u32| (f as usize) < self.chart.own_triangles();
         let bound = |f: u32| {
             let density = self.density[f as usize];
-            Bound { scale: density, floor: 0.0, weight: 0.5 * density }
+            Bound { scale: density, floor: 0.0, weight: 0.5 * density, dual: None }
         };
         let cells = faces.iter().map(|f| Cell { face: *f, bounds: own(*f).then(|| [bound(*f); 6]) }).collect();
         let mean = faces.iter().map(|f| 0.5 * self.density[*f as usize]).sum::<f64>() / faces.len() as f64;
-        let unset = Bound { scale: 1.0, floor: 0.0, weight: mean };
+        let unset = Bound { scale: 1.0, floor: 0.0, weight: mean, dual: None };
         let arcs = region::arc_cells(self.chart, |h| faces.binary_search(&h.face().0).is_ok(), unset);
         let free = region::free_nodes(self.chart, &self.stars, faces);
         let mut problem = Problem::new(self.chart, cells, arcs, free);

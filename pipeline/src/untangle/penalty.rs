@@ -13,11 +13,15 @@ pub(super) enum Penalty {
     },
 }
 
-/// A penalty at one point: its value, minus its slope (>= 0), and its curvature (>= 0).
+/// A penalty at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Value {
     pub value: f64,
+    /// Minus the slope, >= 0.
     pub push: f64,
+    /// The force that the curvature of the coefficient is weighted with, >= 0: the slope, or its dual estimate.
+    pub force: f64,
+    /// The curvature, >= 0, or its dual estimate.
     pub bend: f64,
 }
 
@@ -30,6 +34,25 @@ pub(super) struct Bound {
     pub floor: f64,
     /// How much the penalty counts.
     pub weight: f64,
+    /// The dual variable of the barrier: an estimate of weight / gap; none before the first step.
+    pub dual: Option<f64>,
+}
+
+/// How far a dual variable may be from what it estimates, as a factor. (Far charts need it small: with 1e3 and more
+/// the barrier is crossed too boldly, and steps are cut short.)
+const DUAL_RANGE: f64 = 4.0;
+
+impl Bound {
+    /// Updates the dual variable after a Newton step that changes the coefficient `from` by `change`, to first order,
+    /// and in fact to `to`: the linearised complementarity, kept within a range of weight / gap (as in Waechter and
+    /// Biegler 2006, doi 10.1007/s10107-004-0559-y, equations 14 and 16).
+    pub fn update_dual(&mut self, from: f64, change: f64, to: f64) {
+        let (gap, new_gap) = (from - self.floor, to - self.floor);
+        let dual = self.dual.unwrap_or(self.weight / gap);
+        let stepped = (self.weight - dual * change) / gap;
+        let centre = self.weight / new_gap;
+        self.dual = Some(stepped.clamp(centre / DUAL_RANGE, centre * DUAL_RANGE));
+    }
 }
 
 impl Penalty {
@@ -39,9 +62,10 @@ impl Penalty {
         let w = bound.weight;
         match self {
             Self::Barrier if gap > 0.0 => {
-                Value { value: -w * (gap / bound.scale).ln(), push: w / gap, bend: w / (gap * gap) }
+                let dual = bound.dual.unwrap_or(w / gap);
+                Value { value: -w * (gap / bound.scale).ln(), push: w / gap, force: dual, bend: dual / gap }
             }
-            Self::Barrier => Value { value: f64::INFINITY, push: 0.0, bend: 0.0 },
+            Self::Barrier => Value { value: f64::INFINITY, push: 0.0, force: 0.0, bend: 0.0 },
             Self::Regularised { eps } => {
                 let d = gap / bound.scale;
                 let root = d.hypot(eps);
@@ -49,7 +73,7 @@ impl Penalty {
                 let inverse = if d > 0.0 { 2.0 / (d + root) } else { 2.0 * (root - d) / (eps * eps) };
                 let slope = inverse / root / bound.scale;
                 let bend = 2.0 / (root * root * root) / (bound.scale * bound.scale);
-                Value { value: w * inverse, push: w * slope, bend: w * bend }
+                Value { value: w * inverse, push: w * slope, force: w * slope, bend: w * bend }
             }
         }
     }
@@ -61,7 +85,7 @@ mod tests {
 
     #[test]
     fn slopes_and_curvatures_are_derivatives() {
-        let bound = Bound { scale: 0.7, floor: 0.01, weight: 1.3 };
+        let bound = Bound { scale: 0.7, floor: 0.01, weight: 1.3, dual: None };
         let h = 1e-5;
         for penalty in [Penalty::Barrier, Penalty::Regularised { eps: 0.1 }] {
             for c in [0.05, 0.4, 2.0] {
@@ -73,8 +97,24 @@ mod tests {
     }
 
     #[test]
+    fn a_dual_variable_follows_the_linearised_complementarity_within_its_range() {
+        let mut bound = Bound { scale: 1.0, floor: 0.0, weight: 1.0, dual: None };
+        // At rest the dual is weight / gap.
+        bound.update_dual(2.0, 0.0, 2.0);
+        assert_eq!(bound.dual, Some(0.5));
+        // A small step: (weight - dual change) / gap.
+        bound.update_dual(2.0, 0.4, 2.4);
+        assert_eq!(bound.dual, Some((1.0 - 0.5 * 0.4) / 2.0));
+        // A step that would make it negative, or far too large, is kept in range.
+        bound.update_dual(2.0, 10.0, 2.0);
+        assert_eq!(bound.dual, Some(0.5 / DUAL_RANGE));
+        bound.update_dual(0.01, -0.1, 2.0);
+        assert_eq!(bound.dual, Some(0.5 * DUAL_RANGE));
+    }
+
+    #[test]
     fn the_regularised_penalty_is_smooth_and_falling_through_zero() {
-        let bound = Bound { scale: 1.0, floor: 0.0, weight: 1.0 };
+        let bound = Bound { scale: 1.0, floor: 0.0, weight: 1.0, dual: None };
         let penalty = Penalty::Regularised { eps: 1e-3 };
         let values: Vec<_> = (-50..50).map(|i| penalty.at(f64::from(i) * 1e-4, &bound)).collect();
         assert!(values.windows(2).all(|w| w[0].value > w[1].value && w[0].push > w[1].push));

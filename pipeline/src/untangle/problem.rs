@@ -109,7 +109,7 @@ impl<'a> Problem<'a> {
                 let corners = Corners::new(&six);
                 let dets = corners.dets();
                 let values: [Value; 6] = std::array::from_fn(|k| penalty.at(dets[k], &bounds[k]));
-                form.add_curvature(shape, &values.map(|v| v.push));
+                form.add_curvature(shape, &values.map(|v| v.force));
                 outer.extend((0..6).map(|k| (values[k], corners.gradient(k))));
             }
             let mut hessian = form.matrix();
@@ -179,6 +179,25 @@ impl<'a> Problem<'a> {
         for arc in &mut self.arcs {
             let products = terms::arc_products(&four(arc, x));
             (0..3).for_each(|k| visit(products[k], &mut arc.bounds[k]));
+        }
+    }
+
+    /// Updates the dual variables of a barrier after the step from `from` to `to`, of which `direction` is the full
+    /// length.
+    pub fn update_duals(&mut self, from: &Places, direction: &Places, to: &Places) {
+        for i in 0..self.cells.len() {
+            if self.cells[i].bounds.is_none() {
+                continue;
+            }
+            let [x, d, y] = [from, direction, to].map(|p| Corners::new(&self.six(&self.cells[i], p)));
+            let (c, change, new) = (x.dets(), x.mixed(&d), y.dets());
+            let bounds = self.cells[i].bounds.iter_mut().flatten();
+            bounds.enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));
+        }
+        for arc in &mut self.arcs {
+            let [x, d, y] = [from, direction, to].map(|p| four(arc, p));
+            let (c, change, new) = (terms::arc_products(&x), terms::arc_mixed(&x, &d), terms::arc_products(&y));
+            arc.bounds.iter_mut().enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));
         }
     }
 
