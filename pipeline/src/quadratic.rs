@@ -103,10 +103,14 @@ fn solve(chart: &ClosedChart, number: &[u32], uv: &[[f64; 2]], unknowns: usize) 
 /// Rounds the nodes of a closed chart to the grid: vertices to that of vertices, all others to that of mid-edge
 /// nodes.
 pub(crate) fn to_grid(chart: &ClosedChart, uv: &[[f64; 2]]) -> Vec<GridPoint> {
-    let own = chart.own_vertices();
+    uv.iter().enumerate().map(|(n, p)| node_to_grid(chart, n, *p)).collect()
+}
+
+/// Rounds one node of a closed chart to its grid.
+pub(crate) fn node_to_grid(chart: &ClosedChart, node: usize, uv: [f64; 2]) -> GridPoint {
     let centres = chart.own_nodes()..chart.own_nodes() + chart.loops().len();
-    let is_vertex = |n: usize| n < own || centres.contains(&n);
-    uv.iter().enumerate().map(|(n, p)| if is_vertex(n) { GridPoint::vertex(*p) } else { GridPoint::mid(*p) }).collect()
+    let is_vertex = node < chart.own_vertices() || centres.contains(&node);
+    if is_vertex { GridPoint::vertex(uv) } else { GridPoint::mid(uv) }
 }
 
 /// The jacobian coefficients of a triangle.

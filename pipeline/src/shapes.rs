@@ -85,7 +85,7 @@ pub fn disk_with_holes(n: u32, holes: u32) -> TriangleSoup {
     soup(points.collect(), triangles)
 }
 
-/// Five points in the plane of which Floater's theory is tested: the harmonic map onto the corners of a square
+/// F5: five points in the plane on which Floater's theory is tested. The harmonic map onto the corners of a square
 /// folds (Floater 1998, *Parametric tilings and scattered data approximation*, section 5 gives such an example).
 /// The corners 0 to 3 belong at (1,0), (0,1), (-1,0), (0,-1).
 pub fn floater_five() -> TriangleSoup {
@@ -93,13 +93,13 @@ pub fn floater_five() -> TriangleSoup {
     soup(points, vec![[4, 3, 0], [4, 2, 3], [4, 1, 2], [4, 0, 1]])
 }
 
-/// Three triangles around a vertex in space: the smallest surface whose harmonic map folds.
+/// T4: three triangles around a vertex in space: the smallest surface whose harmonic map folds.
 pub fn folding_three() -> TriangleSoup {
     let points = vec![[0.0, 0.0, 0.0], [1.0, 5.0, 8.0], [-1.0, 1.0, 2.0], [1.0, -5.0, 5.0]];
     soup(points, vec![[0, 1, 2], [0, 2, 3], [0, 3, 1]])
 }
 
-/// Six triangles around a vertex in the plane: the triangle that P1 folds is not the one that P2 folds.
+/// P6: six triangles around a vertex in the plane: the triangle that P1 folds is not the one that P2 folds.
 pub fn folding_six() -> TriangleSoup {
     let ring = [[8.0, 1.0], [6.0, 5.0], [2.0, 9.0], [1.0, 5.0], [-7.0, -3.0], [-1.0, -5.0]];
     let points = std::iter::once([0.0; 3]).chain(ring.map(|[x, y]| [x, y, 0.0])).collect();

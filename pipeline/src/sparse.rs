@@ -6,8 +6,10 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::prelude::Solve;
+use faer::reborrow::Reborrow;
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
-use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef, Triplet};
+use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
+use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef, Triplet};
 use faer::{Conj, MatMut, Par, Side};
 
 /// Stands for a degree of freedom that is prescribed: its row and column are not part of the system.
@@ -185,19 +187,14 @@ pub fn solve_general(
     rhs: &mut [f64],
     columns: usize,
 ) -> Result<(), Error> {
-    let too_large = |_| Error::TooLarge { unknowns };
     let triplets: Vec<_> = entries.iter().map(|(r, c, v)| Triplet::new(*r, *c, *v)).collect();
     let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(unknowns, unknowns, &triplets)
         .map_err(|_| Error::TooLarge { unknowns })?;
-    let (symbolic, _): (SymbolicSparseColMat<u32>, Vec<f64>) = matrix.clone().into_parts();
-    let symbolic = faer::sparse::linalg::solvers::SymbolicLu::try_new(symbolic.rb()).map_err(too_large)?;
-    let factor = faer::sparse::linalg::solvers::Lu::try_new_with_symbolic(symbolic, matrix.rb());
-    let factor = factor.map_err(|_| Error::Singular { unknowns })?;
+    let symbolic = SymbolicLu::try_new(matrix.symbolic()).map_err(|_| Error::TooLarge { unknowns })?;
+    let factor = Lu::try_new_with_symbolic(symbolic, matrix.rb()).map_err(|_| Error::Singular { unknowns })?;
     factor.solve_in_place(MatMut::from_column_major_slice_mut(rhs, unknowns, columns));
     if rhs.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(Error::Singular { unknowns }) }
 }
-
-use faer::reborrow::Reborrow;
 
 #[cfg(test)]
 mod tests {

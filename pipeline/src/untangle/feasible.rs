@@ -2,7 +2,7 @@
 
 use super::newton::minimise;
 use super::penalty::{Bound, Penalty};
-use super::problem::{ArcCell, Cell, Problem};
+use super::problem::{Cell, Problem};
 use super::{Effort, on_grid, places, region};
 use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
@@ -24,35 +24,32 @@ const KEPT: f64 = 1e-3;
 /// Descends from `start`; `None` where the systems are too large or cannot be factorised.
 pub(super) fn untangle(chart: &ClosedChart, start: &[GridPoint], effort: &mut Effort) -> Option<Vec<GridPoint>> {
     let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-    let mut x = places(start, &centres);
-    let mut problem = problem(chart);
-    let energy = problem.objective(&x, Penalty::Barrier) / chart.own_triangles() as f64;
-    let energies = region::energies(chart, &x);
-    for cell in &mut problem.cells {
-        let weight = energies[cell.face as usize].max(1e-6 * energy);
-        cell.bounds = ((cell.face as usize) < chart.own_triangles()).then(|| [unset(weight); 6]);
-    }
-    problem.arcs = region::arc_cells(chart, |_| true, unset(energy));
+    let mut all = places(start, &centres);
+    let energies = region::energies(chart, &all);
+    let mean = energies.iter().sum::<f64>() / chart.own_triangles() as f64;
+    let mut problem = problem(chart, &energies, mean);
+    let mut x = problem.gather(&all);
     problem
         .for_each_bound(&x, |c, bound| *bound = Bound { scale: c, floor: KEPT * c, weight: bound.weight, dual: None });
     descend(&mut problem, &mut x, effort).ok()?;
-    Some(on_grid(chart, &x))
+    problem.moved(&x).for_each(|(n, p)| all[n] = *p);
+    Some(on_grid(chart, &all))
 }
 
 fn unset(weight: f64) -> Bound {
     Bound { scale: 1.0, floor: 0.0, weight, dual: None }
 }
 
-/// All triangles, without penalties yet; every node may move but those of the outer loop.
-fn problem(chart: &ClosedChart) -> Problem<'_> {
-    let cells = (0..chart.triangles().len() as u32).map(|face| Cell { face, bounds: None }).collect();
-    let mut fixed = vec![false; chart.node_count() + chart.loops().len()];
-    for h in chart.outer() {
-        fixed[chart.vertex_node(chart.ends(*h)[0])] = true;
-        fixed[chart.mid_node(*h)] = true;
-    }
-    let free = (0..fixed.len() as u32).filter(|n| !fixed[*n as usize]).collect();
-    Problem::new(chart, cells, Vec::<ArcCell>::new(), free)
+/// All triangles, with weights proportional to their energies but bounds still unset; every node may move but those
+/// of the outer loop.
+fn problem<'a>(chart: &'a ClosedChart, energies: &[f64], mean: f64) -> Problem<'a> {
+    let own = chart.own_triangles() as u32;
+    let bounds = |face: u32| (face < own).then(|| [unset(energies[face as usize].max(1e-6 * mean)); 6]);
+    let cells = (0..chart.triangles().len() as u32).map(|face| Cell { face, bounds: bounds(face) }).collect();
+    let fixed = region::fixed_nodes(chart);
+    let centres = chart.node_count()..chart.node_count() + chart.loops().len();
+    let free: Vec<u32> = (0..fixed.len()).filter(|n| !fixed[*n]).chain(centres).map(|n| n as u32).collect();
+    Problem::new(chart, cells, region::arc_cells(chart, |_| true, unset(mean)), &free)
 }
 
 /// Minimises with falling weights.

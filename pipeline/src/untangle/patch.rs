@@ -8,12 +8,12 @@ use super::newton::minimise;
 use super::penalty::{Bound, Penalty};
 use super::problem::{Cell, Places, Problem};
 use super::region::{self, Stars};
-use super::{Effort, arc, centre_of_hole, on_grid, places};
-use crate::bernstein::Validity;
+use super::{Effort, arc, centre_of_hole, places, terms};
+use crate::bernstein::{ExactDet, Validity};
 use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
-use crate::id::HalfEdgeId;
-use crate::quadratic::{QuadraticMap, det, invalid_triangles};
+use crate::id::{HalfEdgeId, VertexId};
+use crate::quadratic::{QuadraticMap, det, invalid_triangles, node_to_grid};
 use crate::sparse::Error;
 
 /// Rings around invalid triangles, one attempt after another.
@@ -56,15 +56,17 @@ pub(super) fn untangle(
             return Some(nodes);
         }
         let fallback = |k: usize| centres[k].unwrap_or(nodes[chart.centre_node(k)]);
-        let centres: Vec<GridPoint> = (0..centres.len()).map(fallback).collect();
+        x.truncate(chart.node_count());
+        x.extend((0..centres.len()).map(|k| fallback(k).uv()));
         let patches = region::patches(chart, &setting.stars, &seeds, rings);
         if patches.parts.iter().any(|p| p.len() as f64 > LARGEST * chart.own_triangles() as f64) {
             return None;
         }
         for faces in &patches.parts {
-            if let Some(solved) = setting.solve(faces, &patches.distance, rings, &x, &centres, effort) {
-                nodes = on_grid(chart, &solved);
-                x = solved;
+            let weight = |v: usize| 1.5 * (1.0 - f64::from(patches.distance[v]) / rings as f64);
+            for (n, p) in setting.solve(faces, &x, weight, effort).unwrap_or_default() {
+                x[n] = p;
+                nodes[n] = node_to_grid(chart, n, p);
             }
         }
     }
@@ -92,6 +94,8 @@ struct Setting<'a> {
     density: Vec<f64>,
     /// The raised linear map.
     start: Places,
+    /// Per node, whether it lies on the outer loop.
+    fixed: Vec<bool>,
 }
 
 impl<'a> Setting<'a> {
@@ -107,36 +111,37 @@ impl<'a> Setting<'a> {
         };
         let density = (0..plane.len()).map(density).collect();
         let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-        Self { chart, stars, density, start: places(start, &centres) }
+        Self { chart, stars, density, start: places(start, &centres), fixed: region::fixed_nodes(chart) }
     }
 
-    /// Untangles one patch of the map `x`: the places of all nodes and star centres, or nothing where that fails.
+    /// Untangles one patch of the map `x` (all nodes and star centres), begun between `x` and the feasible start by
+    /// the `weight` of each vertex: the new places of the nodes that moved, or nothing where that fails.
     fn solve(
         &self,
         faces: &[u32],
-        distance: &[u32],
-        rings: usize,
         x: &[[f64; 2]],
-        centres: &[GridPoint],
+        weight: impl Fn(usize) -> f64,
         effort: &mut Effort,
-    ) -> Option<Places> {
+    ) -> Option<Vec<(usize, [f64; 2])>> {
         let mut problem = self.problem(faces);
         if problem.unknowns() == 0 {
             return None;
         }
-        let mut x = x[..self.chart.node_count()].to_vec();
-        x.extend(centres.iter().map(|c| c.uv()));
-        self.blend(&mut x, &problem, faces, |v| 1.5 * (1.0 - f64::from(distance[v]) / rings as f64));
+        let mut local = problem.gather(x);
+        self.blend(&mut local, &problem, faces, weight);
         let mut spent = Effort::default();
-        let solved = relax(&mut problem, &mut x, &mut spent);
+        let solved = relax(&mut problem, &mut local, &mut spent);
         effort.iterations += spent.iterations;
         solved.ok()?;
-        let moved = on_grid(self.chart, &x);
+        let mut moved: Vec<(usize, [f64; 2])> = problem.moved(&local).map(|(n, p)| (n, *p)).collect();
+        moved.sort_unstable_by_key(|m| m.0);
+        let place = |n: usize| moved.binary_search_by_key(&n, |m| m.0).map_or(x[n], |i| moved[i].1);
+        let cell = |f: &u32| self.chart.nodes(*f as usize).map(|n| node_to_grid(self.chart, n, place(n)));
         let mut own = faces.iter().filter(|f| (**f as usize) < self.chart.own_triangles());
-        let valid = own.all(|f| det(self.chart, &moved, *f as usize).validity() != Validity::Invalid);
+        let valid = own.all(|f| ExactDet::new(cell(f)).validity() != Validity::Invalid);
         valid.then(|| {
             effort.merge(Effort { iterations: 0, ..spent });
-            x
+            moved
         })
     }
 
@@ -144,19 +149,21 @@ impl<'a> Setting<'a> {
     /// and that mid-edge nodes take from both ends.
     fn blend(&self, x: &mut Places, problem: &Problem, faces: &[u32], weight: impl Fn(usize) -> f64) {
         let own = self.chart.own_vertices();
-        let share = |v: crate::id::VertexId| if v.index() < own { weight(v.index()).clamp(0.0, 1.0) } else { 0.0 };
-        let mut shares = vec![0.0; x.len()];
+        let share = |v: VertexId| if v.index() < own { weight(v.index()).clamp(0.0, 1.0) } else { 0.0 };
+        let mut shares: Vec<(usize, f64)> = Vec::with_capacity(6 * faces.len());
         for f in faces {
             let nodes = self.chart.nodes(*f as usize);
             let corner = self.chart.triangles()[*f as usize].map(share);
-            for k in 0..3 {
-                shares[nodes[k]] = corner[k];
-                shares[nodes[3 + k]] = 0.5 * (corner[k] + corner[(k + 1) % 3]);
-            }
+            shares.extend((0..3).map(|k| (nodes[k], corner[k])));
+            shares.extend((0..3).map(|k| (nodes[3 + k], 0.5 * (corner[k] + corner[(k + 1) % 3]))));
         }
-        for n in problem.free.iter().map(|n| *n as usize) {
-            let to = self.start[n];
-            x[n] = [0, 1].map(|k| x[n][k] + shares[n] * (to[k] - x[n][k]));
+        shares.sort_unstable_by_key(|s| s.0);
+        for local in &problem.free {
+            let n = problem.nodes()[*local as usize] as usize;
+            let found = shares.binary_search_by_key(&n, |s| s.0);
+            let (share, to) = (found.map_or(0.0, |i| shares[i].1), self.start[n]);
+            let p = &mut x[*local as usize];
+            *p = [0, 1].map(|k| p[k] + share * (to[k] - p[k]));
         }
     }
 
@@ -170,19 +177,13 @@ impl<'a> Setting<'a> {
         let cells = faces.iter().map(|f| Cell { face: *f, bounds: own(*f).then(|| [bound(*f); 6]) }).collect();
         let mean = faces.iter().map(|f| 0.5 * self.density[*f as usize]).sum::<f64>() / faces.len() as f64;
         let unset = Bound { scale: 1.0, floor: 0.0, weight: mean, dual: None };
-        let arcs = region::arc_cells(self.chart, |h| faces.binary_search(&h.face().0).is_ok(), unset);
-        let free = region::free_nodes(self.chart, &self.stars, faces);
-        let mut problem = Problem::new(self.chart, cells, arcs, free);
-        let scales: Vec<[f64; 3]> = problem
-            .arcs
-            .iter()
-            .map(|a| a.nodes.map(|n| self.start[n as usize]))
-            .map(|x| super::terms::arc_products(&x))
-            .collect();
-        for (arc, scale) in problem.arcs.iter_mut().zip(scales) {
+        let mut arcs = region::arc_cells(self.chart, |h| faces.binary_search(&h.face().0).is_ok(), unset);
+        let free = region::free_nodes(self.chart, &self.stars, &self.fixed, faces);
+        for arc in &mut arcs {
+            let scale = terms::arc_products(&arc.nodes.map(|n| self.start[n as usize]));
             (0..3).for_each(|k| arc.bounds[k].scale = scale[k]);
         }
-        problem
+        Problem::new(self.chart, cells, arcs, &free)
     }
 }
 

@@ -7,7 +7,7 @@ use crate::element;
 use crate::jacobian::{Corners, Six};
 use crate::sparse::{Error, PRESCRIBED, Pattern};
 
-/// The places of all nodes of a closed chart, followed by the star centre of each hole.
+/// Places of nodes.
 pub(super) type Places = Vec<[f64; 2]>;
 
 /// A triangle of the region, with penalties on its six coefficients (none on virtual fans).
@@ -22,14 +22,19 @@ pub(super) struct ArcCell {
     pub bounds: [Bound; 3],
 }
 
-/// The part of a chart in which nodes may move, and the penalties that hold there.
+/// The part of a chart in which nodes may move, and the penalties that hold there. Its nodes have numbers of their
+/// own, so that a small region costs little, however large the chart is.
 pub(super) struct Problem<'a> {
-    pub chart: &'a ClosedChart,
+    chart: &'a ClosedChart,
     pub cells: Vec<Cell>,
     pub arcs: Vec<ArcCell>,
-    /// The nodes that may move.
+    /// The nodes of the region in the numbering of the chart (star centres after all others), ascending.
+    nodes: Vec<u32>,
+    /// Per cell, its six nodes in the numbering of the region.
+    of_cell: Vec<[u32; 6]>,
+    /// The nodes that may move, in the numbering of the region.
     pub free: Vec<u32>,
-    /// Per node, its place among `free`, or [`PRESCRIBED`].
+    /// Per node of the region, its place among `free`, or [`PRESCRIBED`].
     number: Vec<u32>,
 }
 
@@ -40,19 +45,40 @@ pub(super) struct Model {
 }
 
 impl<'a> Problem<'a> {
-    pub fn new(chart: &'a ClosedChart, cells: Vec<Cell>, arcs: Vec<ArcCell>, free: Vec<u32>) -> Self {
-        let mut number = vec![PRESCRIBED; chart.node_count() + chart.loops().len()];
+    /// The problem on `cells` and `arcs`, of whose nodes those in `free` may move; nodes as numbered in the chart,
+    /// star centres after all others.
+    pub fn new(chart: &'a ClosedChart, cells: Vec<Cell>, mut arcs: Vec<ArcCell>, free: &[u32]) -> Self {
+        let six = |cell: &Cell| chart.nodes(cell.face as usize).map(|n| n as u32);
+        let mut nodes: Vec<u32> = cells.iter().flat_map(six).chain(arcs.iter().flat_map(|a| a.nodes)).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let local = |n: u32| nodes.partition_point(|m| *m < n) as u32;
+        let of_cell = cells.iter().map(|c| six(c).map(local)).collect();
+        arcs.iter_mut().for_each(|a| a.nodes = a.nodes.map(local));
+        let free: Vec<u32> = free.iter().map(|n| local(*n)).collect();
+        let mut number = vec![PRESCRIBED; nodes.len()];
         free.iter().enumerate().for_each(|(i, n)| number[*n as usize] = i as u32);
-        Self { chart, cells, arcs, free, number }
+        Self { chart, cells, arcs, nodes, of_cell, free, number }
+    }
+
+    /// The nodes of the region, as numbered in the chart, ascending.
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes
+    }
+
+    /// The places of the region's nodes, out of those of the whole chart.
+    pub fn gather(&self, all: &[[f64; 2]]) -> Places {
+        self.nodes.iter().map(|n| all[*n as usize]).collect()
+    }
+
+    /// The nodes that may move, as numbered in the chart, each with its place in `x`.
+    pub fn moved<'x>(&self, x: &'x Places) -> impl Iterator<Item = (usize, &'x [f64; 2])> {
+        self.free.iter().map(|n| (self.nodes[*n as usize] as usize, &x[*n as usize]))
     }
 
     /// The number of scalar unknowns: two per free node.
     pub fn unknowns(&self) -> usize {
         2 * self.free.len()
-    }
-
-    fn nodes(&self, cell: &Cell) -> [usize; 6] {
-        self.chart.nodes(cell.face as usize)
     }
 
     /// The pattern of the Hessian: first the triangles, then the arcs (padded to the same size).
@@ -62,9 +88,8 @@ impl<'a> Problem<'a> {
             i => [2 * i, 2 * i + 1],
         };
         let mut elements: Vec<[u32; 12]> = Vec::with_capacity(self.cells.len() + self.arcs.len());
-        for cell in &self.cells {
-            let nodes = self.nodes(cell);
-            elements.push(std::array::from_fn(|i| pair(nodes[i / 2])[i % 2]));
+        for nodes in &self.of_cell {
+            elements.push(std::array::from_fn(|i| pair(nodes[i / 2] as usize)[i % 2]));
         }
         for arc in &self.arcs {
             elements
@@ -76,8 +101,8 @@ impl<'a> Problem<'a> {
     /// The energy of the region plus all penalties.
     pub fn objective(&self, x: &Places, penalty: Penalty) -> f64 {
         let mut total = 0.0;
-        for cell in &self.cells {
-            let six = self.six(cell, x);
+        for (i, cell) in self.cells.iter().enumerate() {
+            let six = self.six(i, x);
             total += element::energy(&element::stiffness(&self.chart.shapes()[cell.face as usize]), &six);
             if let Some(bounds) = &cell.bounds {
                 let dets = Corners::new(&six).dets();
@@ -91,15 +116,15 @@ impl<'a> Problem<'a> {
         total
     }
 
-    fn six(&self, cell: &Cell, x: &Places) -> Six {
-        self.nodes(cell).map(|n| x[n])
+    fn six(&self, cell: usize, x: &Places) -> Six {
+        self.of_cell[cell].map(|n| x[n as usize])
     }
 
     /// Gradient and (positive) Hessian at `x`.
     pub fn model(&self, x: &Places, penalty: Penalty, pattern: &Pattern) -> Model {
         let mut model = Model { gradient: vec![0.0; self.unknowns()], hessian: pattern.zeros() };
         for (i, cell) in self.cells.iter().enumerate() {
-            let six = self.six(cell, x);
+            let six = self.six(i, x);
             let shape = &self.chart.shapes()[cell.face as usize];
             let stiffness = element::stiffness(shape);
             let mut gradient = energy_gradient(&stiffness, &six);
@@ -115,7 +140,7 @@ impl<'a> Problem<'a> {
             let mut hessian = form.matrix();
             add_outer(&mut gradient, &mut hessian, &outer);
             pattern.add(&mut model.hessian, i, &hessian);
-            self.scatter(&mut model.gradient, &self.nodes(cell), &gradient);
+            self.scatter(&mut model.gradient, &self.of_cell[i], &gradient);
         }
         for (i, arc) in self.arcs.iter().enumerate() {
             let places = four(arc, x);
@@ -126,14 +151,14 @@ impl<'a> Problem<'a> {
                 .collect();
             add_outer(&mut gradient, &mut hessian, &outer);
             pattern.add(&mut model.hessian, self.cells.len() + i, &hessian);
-            self.scatter(&mut model.gradient, &arc.nodes.map(|n| n as usize), &gradient);
+            self.scatter(&mut model.gradient, &arc.nodes, &gradient);
         }
         model
     }
 
-    fn scatter(&self, gradient: &mut [f64], nodes: &[usize], element: &[f64; 12]) {
+    fn scatter(&self, gradient: &mut [f64], nodes: &[u32], element: &[f64; 12]) {
         for (i, n) in nodes.iter().enumerate() {
-            let number = self.number[*n];
+            let number = self.number[*n as usize];
             if number != PRESCRIBED {
                 gradient[2 * number as usize] += element[2 * i];
                 gradient[2 * number as usize + 1] += element[2 * i + 1];
@@ -154,9 +179,9 @@ impl<'a> Problem<'a> {
     pub fn longest_step(&self, x: &Places, direction: &Places) -> f64 {
         let mut longest = f64::INFINITY;
         let mut meet = |c0: f64, c1: f64, c2: f64| longest = longest.min(terms::first_zero(c0, c1, c2));
-        for cell in &self.cells {
+        for (i, cell) in self.cells.iter().enumerate() {
             let Some(bounds) = &cell.bounds else { continue };
-            let (at, along) = (Corners::new(&self.six(cell, x)), Corners::new(&self.six(cell, direction)));
+            let (at, along) = (Corners::new(&self.six(i, x)), Corners::new(&self.six(i, direction)));
             let (c0, c1, c2) = (at.dets(), at.mixed(&along), along.dets());
             (0..6).for_each(|k| meet(c0[k] - bounds[k].floor, c1[k], c2[k]));
         }
@@ -171,7 +196,7 @@ impl<'a> Problem<'a> {
     /// Calls `visit` with every penalised quantity and its bound.
     pub fn for_each_bound(&mut self, x: &Places, mut visit: impl FnMut(f64, &mut Bound)) {
         for i in 0..self.cells.len() {
-            let dets = Corners::new(&self.six(&self.cells[i], x)).dets();
+            let dets = Corners::new(&self.six(i, x)).dets();
             if let Some(bounds) = &mut self.cells[i].bounds {
                 (0..6).for_each(|k| visit(dets[k], &mut bounds[k]));
             }
@@ -189,7 +214,7 @@ impl<'a> Problem<'a> {
             if self.cells[i].bounds.is_none() {
                 continue;
             }
-            let [x, d, y] = [from, direction, to].map(|p| Corners::new(&self.six(&self.cells[i], p)));
+            let [x, d, y] = [from, direction, to].map(|p| Corners::new(&self.six(i, p)));
             let (c, change, new) = (x.dets(), x.mixed(&d), y.dets());
             let bounds = self.cells[i].bounds.iter_mut().flatten();
             bounds.enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));

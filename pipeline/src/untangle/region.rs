@@ -83,9 +83,19 @@ fn components(chart: &ClosedChart, faces: Vec<u32>) -> Vec<Vec<u32>> {
     keyed.chunk_by(|a, b| a.0 == b.0).map(|part| part.iter().map(|k| k.1).collect()).collect()
 }
 
+/// Per node of the closed chart, whether it lies on the outer loop, where nothing moves.
+pub(super) fn fixed_nodes(chart: &ClosedChart) -> Vec<bool> {
+    let mut fixed = vec![false; chart.node_count()];
+    for h in chart.outer() {
+        fixed[chart.vertex_node(chart.ends(*h)[0])] = true;
+        fixed[chart.mid_node(*h)] = true;
+    }
+    fixed
+}
+
 /// The nodes that may move when only `faces` (ascending) may change: all of their triangles are among them, and
-/// they are not on the outer loop.
-pub(super) fn free_nodes(chart: &ClosedChart, stars: &Stars, faces: &[u32]) -> Vec<u32> {
+/// they are not `fixed`.
+pub(super) fn free_nodes(chart: &ClosedChart, stars: &Stars, fixed: &[bool], faces: &[u32]) -> Vec<u32> {
     let among = |f: u32| faces.binary_search(&f).is_ok();
     let mut free = Vec::new();
     for &f in faces {
@@ -93,23 +103,16 @@ pub(super) fn free_nodes(chart: &ClosedChart, stars: &Stars, faces: &[u32]) -> V
         for (k, v) in chart.triangles()[f as usize].iter().enumerate() {
             let h = HalfEdgeId::at(3 * f as usize + k);
             let sides = chart.edges().sides(chart.edges().edge(h));
-            if sides.len() == 2 && sides.iter().all(|s| among(s.face().0)) {
+            if !fixed[nodes[3 + k]] && sides.iter().all(|s| among(s.face().0)) {
                 free.push(nodes[3 + k] as u32);
             }
-            if stars.around(v.index()).iter().all(|g| among(*g)) {
+            if !fixed[nodes[k]] && stars.around(v.index()).iter().all(|g| among(*g)) {
                 free.push(nodes[k] as u32);
             }
         }
     }
     free.sort_unstable();
     free.dedup();
-    // Vertices of the outer loop are fixed whatever lies around them.
-    let outer: Vec<u32> = {
-        let mut all: Vec<u32> = chart.outer().iter().map(|h| chart.vertex_node(chart.ends(*h)[0]) as u32).collect();
-        all.sort_unstable();
-        all
-    };
-    free.retain(|n| outer.binary_search(n).is_err());
     free
 }
 
