@@ -64,16 +64,24 @@ impl Corners {
     }
 }
 
+/// A curved triangle, a direction, and the triangle moved along it.
+#[cfg(test)]
+pub(crate) mod samples {
+    use super::Six;
+
+    pub(crate) const X: Six = [[0.0, 0.1], [1.0, 0.0], [0.2, 0.9], [0.5, -0.1], [0.7, 0.5], [0.1, 0.6]];
+    pub(crate) const Y: Six = [[0.3, 0.0], [-0.2, 0.1], [0.0, 0.4], [0.1, 0.2], [-0.3, 0.1], [0.2, -0.5]];
+
+    pub(crate) fn moved(t: f64) -> Six {
+        std::array::from_fn(|n| [X[n][0] + t * Y[n][0], X[n][1] + t * Y[n][1]])
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const X: Six = [[0.0, 0.1], [1.0, 0.0], [0.2, 0.9], [0.5, -0.1], [0.7, 0.5], [0.1, 0.6]];
-    const Y: Six = [[0.3, 0.0], [-0.2, 0.1], [0.0, 0.4], [0.1, 0.2], [-0.3, 0.1], [0.2, -0.5]];
-
-    fn moved(t: f64) -> Six {
-        std::array::from_fn(|n| [X[n][0] + t * Y[n][0], X[n][1] + t * Y[n][1]])
-    }
+    use samples::{X, Y, moved};
 
     #[test]
     fn coefficients_are_those_of_the_exact_ones() {

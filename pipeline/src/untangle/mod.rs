@@ -15,8 +15,8 @@
 //! The barrier acts on the six Bernstein coefficients of each jacobian (sufficient for validity), relative to their
 //! size in the start, above a thousandth of it; its weight falls from a tenth to a millionth of the energy. Steps
 //! are Newton's, with dual estimates in the barrier's curvature, from which the concave part is left out; they are
-//! cut short of the nearest floor. Every loop has a fixed limit. As harmonic map, start and result all include the energy of the virtual fans (with free nodes),
-//! the harmonic energy is a lower bound of the result's.
+//! cut short of the nearest floor. Every loop has a fixed limit. As harmonic map, start and result all include the
+//! energy of the virtual fans (with free nodes), the harmonic energy is a lower bound of the result's.
 
 mod feasible;
 mod newton;

@@ -136,14 +136,8 @@ pub(super) fn first_zero(c0: f64, c1: f64, c2: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jacobian::samples::{X, Y, moved};
     use crate::jacobian::{Corners, Six};
-
-    const X: Six = [[0.0, 0.1], [1.0, 0.0], [0.2, 0.9], [0.5, -0.1], [0.7, 0.5], [0.1, 0.6]];
-    const Y: Six = [[0.3, 0.0], [-0.2, 0.1], [0.0, 0.4], [0.1, 0.2], [-0.3, 0.1], [0.2, -0.5]];
-
-    fn moved(t: f64) -> Six {
-        std::array::from_fn(|n| [X[n][0] + t * Y[n][0], X[n][1] + t * Y[n][1]])
-    }
 
     #[test]
     fn arcs_along_a_line_are_quadratic() {
