@@ -3,11 +3,13 @@
 //! Only vertices and faces matter here, so only these reach the library: lines that are continued are joined,
 //! comments, groups, materials, normals, texture coordinates, colours, points and lines are left out first. (With
 //! groups the library would copy vertices; it takes lines of three and more points for faces, and refuses normals
-//! and texture coordinates that nobody needs.) Polygons are cut into triangles.
+//! and texture coordinates that nobody needs.) Polygons are cut into triangles; vertices keep the numbers they have in
+//! the file.
 
 use super::{ReadError, polygon};
 use crate::outcome::Code;
 use pipeline::mesh::TriangleSoup;
+use pipeline::space::Vec3;
 
 /// Why bytes are no OBJ file.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -68,25 +70,42 @@ pub(super) fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
     // Names and comments may be in any encoding; numbers are ASCII.
     let text = String::from_utf8_lossy(bytes);
     let statements = statements(&text);
-    check(&statements)?;
-    let geometry: String = statements.iter().map(|s| format!("{}\n", s.words.join(" "))).collect();
+    let geometry = check(&statements)?;
+    let plain: String = statements.iter().map(|s| format!("{}\n", s.words.join(" "))).collect();
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let loaded = tobj::load_obj_buf(&mut geometry.as_bytes(), &tobj::LoadOptions::default(), no_materials);
+    let loaded = tobj::load_obj_buf(&mut plain.as_bytes(), &tobj::LoadOptions::default(), no_materials);
     let (models, _) = loaded.map_err(|e| ObjError::Library { problem: e.to_string() })?;
-    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    let mut triangles = Vec::new();
     for mesh in models.iter().map(|m| &m.mesh) {
-        let base = points.len() as u32;
-        points.extend(mesh.positions.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
+        geometry.agrees_with(&mesh.positions)?;
         let mut rest = &mesh.indices[..];
         let triangles_only = mesh.face_arities.is_empty().then(|| vec![3; rest.len() / 3]);
         for size in triangles_only.as_ref().unwrap_or(&mesh.face_arities) {
             let (face, others) = rest.split_at((*size as usize).min(rest.len()));
-            let corners: Vec<u32> = face.iter().map(|i| base + i).collect();
-            triangles.extend(polygon::triangulate(&corners, &points));
+            let corners: Vec<u32> = face.iter().map(|i| geometry.first_used[*i as usize]).collect();
+            triangles.extend(polygon::triangulate(&corners, &geometry.points));
             rest = others;
         }
     }
-    Ok(TriangleSoup::new(points, triangles)?)
+    Ok(TriangleSoup::new(geometry.points, triangles)?)
+}
+
+/// The vertices of a file in its own order, and in the order in which faces first use them, which is the library's.
+struct Geometry {
+    points: Vec<Vec3>,
+    first_used: Vec<u32>,
+}
+
+impl Geometry {
+    /// The library must have found the same vertices in that order: then its indices can be turned back into those
+    /// of the file.
+    fn agrees_with(&self, positions: &[f64]) -> Result<(), ObjError> {
+        let expected = self.first_used.iter().flat_map(|v| self.points[*v as usize]);
+        if positions.iter().copied().eq(expected) {
+            return Ok(());
+        }
+        Err(ObjError::Library { problem: "vertices in an unexpected order".to_owned() })
+    }
 }
 
 /// A vertex or face: its keyword and numbers, and its (first) line in the file, from 1.
@@ -129,35 +148,40 @@ fn geometry(mut words: Vec<&str>) -> Option<Vec<&str>> {
 }
 
 /// Finds what the library would refuse without telling the line.
-fn check(statements: &[Statement]) -> Result<(), ObjError> {
+fn check(statements: &[Statement]) -> Result<Geometry, ObjError> {
     let vertices = statements.iter().filter(|s| s.words[0] == "v").count();
-    let mut so_far = 0;
+    let mut geometry = Geometry { points: Vec::with_capacity(vertices), first_used: Vec::new() };
+    let mut used = vec![false; vertices];
     for statement in statements {
         let line = statement.line;
         let syntax = || ObjError::Syntax { line, text: shown(&statement.words.join(" ")) };
-        if statement.words.len() < 4 {
-            return Err(syntax());
-        }
+        let words = statement.words.get(1..).filter(|w| w.len() >= 3).ok_or_else(syntax)?;
         if statement.words[0] == "v" {
-            so_far += 1;
-            for word in &statement.words[1..] {
-                let number: f64 = word.parse().map_err(|_| syntax())?;
-                if !number.is_finite() {
+            let mut point = [0.0_f64; 3];
+            for (c, word) in point.iter_mut().zip(words) {
+                *c = word.parse().map_err(|_| syntax())?;
+                if !c.is_finite() {
                     return Err(ObjError::NotFinite { line, value: shown(word) });
                 }
             }
+            geometry.points.push(point);
             continue;
         }
-        for word in &statement.words[1..] {
+        for word in words {
             let index: i64 = word.parse().map_err(|_| syntax())?;
             // Negative indices count back from the vertices so far.
-            let limit = if index < 0 { so_far } else { vertices };
+            let limit = if index < 0 { geometry.points.len() } else { vertices };
             if index == 0 || index.unsigned_abs() > limit as u64 {
                 return Err(ObjError::OutOfRange { line, index, vertices: limit });
             }
+            let back = index.unsigned_abs() as usize;
+            let vertex = if index < 0 { limit - back } else { back - 1 };
+            if !std::mem::replace(&mut used[vertex], true) {
+                geometry.first_used.push(vertex as u32);
+            }
         }
     }
-    Ok(())
+    Ok(geometry)
 }
 
 fn shown(text: &str) -> String {
@@ -205,6 +229,13 @@ mod tests {
             let soup = read(file.as_bytes()).unwrap_or_else(|e| panic!("file {i}: {e}"));
             assert_eq!(soup, plain, "file {i}");
         }
+    }
+
+    #[test]
+    fn vertices_keep_their_place_in_the_file() {
+        let soup = read(format!("v 9 9 9\n{SQUARE}f 5 3 4\nf -2 -1 2\n").as_bytes()).expect("two triangles");
+        assert_eq!((soup.points().len(), soup.points()[0]), (5, [9.0; 3]));
+        assert_eq!(soup.triangles(), [[4, 2, 3], [3, 4, 1]]);
     }
 
     #[test]
