@@ -8,14 +8,20 @@ import sys
 import vtk
 
 
-def actors(path, field, limits):
-    reader = vtk.vtkXMLUnstructuredGridReader()
-    reader.SetFileName(path)
+def bent(port):
+    """A mapper for cells whose quadratic edges are drawn as the curves they are."""
     skin = vtk.vtkDataSetSurfaceFilter()
-    skin.SetInputConnection(reader.GetOutputPort())
+    skin.SetInputConnection(port)
     skin.SetNonlinearSubdivisionLevel(3)
     mapper = vtk.vtkPolyDataMapper()
     mapper.SetInputConnection(skin.GetOutputPort())
+    return mapper
+
+
+def actors(path, field, limits):
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(path)
+    mapper = bent(reader.GetOutputPort())
     mapper.SetScalarModeToUseCellFieldData()
     mapper.SelectColorArray(field)
     reader.Update()
@@ -33,11 +39,7 @@ def actors(path, field, limits):
     surface.GetProperty().SetDiffuse(0.6)
     edges = vtk.vtkExtractEdges()
     edges.SetInputConnection(reader.GetOutputPort())
-    bend = vtk.vtkDataSetSurfaceFilter()
-    bend.SetInputConnection(edges.GetOutputPort())
-    bend.SetNonlinearSubdivisionLevel(3)
-    line_mapper = vtk.vtkPolyDataMapper()
-    line_mapper.SetInputConnection(bend.GetOutputPort())
+    line_mapper = bent(edges.GetOutputPort())
     line_mapper.ScalarVisibilityOff()
     lines = vtk.vtkActor()
     lines.SetMapper(line_mapper)

@@ -4,7 +4,7 @@ use crate::formats::{self, Kind, vtu};
 use crate::outcome::{Code, Reason, Status};
 use crate::publish::{PublishError, Publisher};
 use crate::report::{self, Input, Output, Report};
-use crate::settings::{Order, Settings};
+use crate::settings::Settings;
 use pipeline::distortion::{self, CellFields};
 use pipeline::mesh::TriangleSoup;
 use pipeline::repair::Repaired;
@@ -58,12 +58,6 @@ pub struct Done {
     pub report: Report,
     /// Whether an older result was up to date.
     pub up_to_date: bool,
-}
-
-/// A result before it is published: its report and the other files.
-struct Result_ {
-    report: Report,
-    files: Vec<(String, Vec<u8>)>,
 }
 
 /// CPU seconds of this thread.
@@ -132,7 +126,7 @@ impl Job {
                 vec![]
             }
         };
-        self.publish(Result_ { report, files }, publisher, &mut clock)
+        self.publish(report, files, publisher, &mut clock)
     }
 
     fn input(&self, content: Option<&[u8]>) -> Input {
@@ -195,13 +189,17 @@ impl Job {
         }
     }
 
-    fn publish(&self, result: Result_, publisher: &Publisher, clock: &mut Clock) -> Result<Done, PublishError> {
-        let Result_ { mut report, mut files } = result;
+    /// Completes the report and publishes it with the other files.
+    fn publish(
+        &self,
+        mut report: Report,
+        mut files: Vec<(String, Vec<u8>)>,
+        publisher: &Publisher,
+        clock: &mut Clock,
+    ) -> Result<Done, PublishError> {
         report.outputs = files.iter().map(|(name, content)| Output::of(name, content)).collect();
         clock.next(&mut report, Stage::Write);
-        // A report holds finite numbers and plain strings: it always becomes JSON.
-        let json = report.to_json().unwrap_or_default();
-        files.push((report::FILE.to_owned(), json));
+        files.push((report::FILE.to_owned(), report.to_json().map_err(PublishError::Report)?));
         publisher.publish(&self.name, &files)?;
         match &report.reason {
             None => tracing::info!(status = %report.status, charts = report.charts.len(), "ends"),
@@ -235,13 +233,13 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, Reason> {
     std::fs::read(path).map_err(|e| unreadable(e.to_string()))
 }
 
-/// Repairs a soup, which puts everything known about the surface into the report.
-fn repaired(soup: &TriangleSoup, settings: &Settings, report: &mut Report) -> Result<Repaired, Reason> {
+/// Repairs a soup as the settings say.
+///
+/// # Errors
+/// The refusal, where nothing is left.
+pub fn repaired(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Reason> {
     let found = repair(soup, &pipeline::repair::Settings { weld: settings.weld });
-    let found = found.map_err(|e| Reason::new(Code::OnlyDegenerate, e))?;
-    report.surface = Some(report::surface(&found));
-    report.repairs = Some(report::repairs(&found.report));
-    Ok(found)
+    found.map_err(|e| Reason::new(Code::OnlyDegenerate, e))
 }
 
 /// From a soup to the files of a certified result.
@@ -252,13 +250,14 @@ fn stages(
     clock: &mut Clock,
 ) -> Result<Vec<(String, Vec<u8>)>, Reason> {
     clock.next(report, Stage::Decompose);
-    let found = repaired(soup, settings, report)?;
+    let found = repaired(soup, settings)?;
+    report.surface = Some(report::surface(&found));
+    report.repairs = Some(report::repairs(&found.report));
     let atlas = decompose(&found.mesh).map_err(|e| Reason::new(Code::NeedsDecomposition, e))?;
-    let order = if settings.order == Order::Linear { pipeline::Order::Linear } else { pipeline::Order::Quadratic };
     let mut done = Vec::new();
     for chart in atlas.charts() {
         clock.next(report, Stage::Map);
-        let mapped = map_chart(chart, order).map_err(|e| map_refusal(&e))?;
+        let mapped = map_chart(chart, settings.order).map_err(|e| map_refusal(&e, &found, chart))?;
         clock.next(report, Stage::Untangle);
         done.push(finish_chart(mapped));
     }
@@ -273,13 +272,18 @@ fn stages(
     encode(&found, atlas.charts(), &done, &fields)
 }
 
-fn map_refusal(error: &MapError) -> Reason {
+/// The refusal of a chart that cannot be mapped; a triangle is named by its number in the input.
+fn map_refusal(error: &MapError, found: &Repaired, chart: &pipeline::atlas::Chart) -> Reason {
     let code = match error {
         MapError::Linear(pipeline::linear::Error::Solver(pipeline::sparse::Error::TooLarge { .. })) => Code::TooLarge,
         _ => Code::NeedsSplit,
     };
     let place = match error {
-        MapError::Linear(pipeline::linear::Error::Folded { first, .. }) => Some(format!("triangle {first}")),
+        // Triangles of virtual fans come after those of the chart: they are not in the input.
+        MapError::Linear(pipeline::linear::Error::Folded { first, .. }) => {
+            let face = chart.faces().get(first.index());
+            face.map(|f| format!("triangle {}", found.mesh.source_triangle(f.index())))
+        }
         _ => None,
     };
     Reason { code, message: error.to_string(), place }

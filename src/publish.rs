@@ -37,6 +37,9 @@ pub enum PublishError {
         /// Why.
         error: io::Error,
     },
+    /// The report does not become JSON.
+    #[error("the report cannot be written as JSON: {0}; that is a fault of planish")]
+    Report(serde_json::Error),
     /// Something stands where the result belongs.
     #[error(
         "{0} is there already and is no result of planish: it was left alone; move it away or use another output folder"

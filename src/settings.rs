@@ -1,17 +1,8 @@
 //! Settings: what the user may say, typed and checked in one place.
 
+use pipeline::Order;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-
-/// The order of the elements.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Order {
-    /// 1
-    Linear,
-    /// 2
-    #[default]
-    Quadratic,
-}
 
 /// The form of log messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]

@@ -37,6 +37,22 @@ fn refusals_say_where_and_what_to_do() {
     }
 }
 
+/// The triangles come in reverse order, behind one that repair drops: the refusal names a triangle of the file.
+#[test]
+fn a_chart_beyond_double_precision_is_refused_as_needing_a_split() {
+    let finger = pipeline::shapes::finger(12, 22);
+    let mut text: String = finger.points().iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    text += "f 1 1 2\n";
+    text.extend(finger.triangles().iter().rev().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1)));
+    let (ended, report) = Out::new().run_bytes("finger.obj", text.as_bytes());
+    let reason = report.reason.expect("a reason");
+    assert_eq!((ended.code, reason.code), (Some(1), Code::NeedsSplit), "{}", reason.message);
+    let place = reason.place.expect("a place");
+    let triangle: usize = place.strip_prefix("triangle ").and_then(|t| t.parse().ok()).expect("a number");
+    assert!((1..=finger.triangles().len()).contains(&triangle), "{place}");
+    assert!(report.outputs.is_empty() && report.surface.is_some());
+}
+
 #[test]
 fn one_bad_input_does_not_keep_the_others() {
     let out = Out::new();

@@ -45,7 +45,7 @@ impl ClosedChart {
             }
         }
         Self {
-            edges: EdgeTable::new(&triangles),
+            edges: if chart.holes().is_empty() { chart.edges().clone() } else { EdgeTable::new(&triangles) },
             triangles,
             shapes,
             own_triangles: chart.triangles().len(),

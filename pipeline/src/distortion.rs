@@ -6,6 +6,7 @@ use crate::atlas::Chart;
 use crate::bernstein::{self, ExactDet};
 use crate::certify::CertifiedMap;
 use crate::element;
+use crate::mesh::Stars;
 
 /// The fields of one triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,24 +103,21 @@ pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summ
 
 /// Per vertex, the area scale of its star of two rings, with the area of its own star as weight.
 fn star_scales(chart: &Chart, map: &CertifiedMap) -> Vec<(f64, f64)> {
-    let mut around: Vec<Vec<u32>> = vec![Vec::new(); chart.vertices().len()];
-    for (f, t) in chart.triangles().iter().enumerate() {
-        t.iter().for_each(|v| around[v.index()].push(f as u32));
-    }
+    let stars = Stars::new(chart.triangles(), chart.vertices().len());
     let place = |n: u32| map.map().nodes[n as usize];
     let plane: Vec<f64> =
         map.map().cells.iter().map(|c| area_in_plane(&ExactDet::new(c.map(place)).coefficients())).collect();
     let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
     let two_rings = |v: usize| {
-        let ring = around[v].iter().flat_map(|f| chart.triangles()[*f as usize]);
-        let mut faces: Vec<u32> = ring.flat_map(|u| around[u.index()].iter().copied()).collect();
+        let ring = stars.around(v).iter().flat_map(|f| chart.triangles()[*f as usize]);
+        let mut faces: Vec<u32> = ring.flat_map(|u| stars.around(u.index()).iter().copied()).collect();
         faces.sort_unstable();
         faces.dedup();
         let sum = |area: &[f64]| faces.iter().map(|f| area[*f as usize]).sum::<f64>();
-        let weight = around[v].iter().map(|f| space[*f as usize]).sum::<f64>();
+        let weight = stars.around(v).iter().map(|f| space[*f as usize]).sum::<f64>();
         (sum(&plane) / sum(&space), weight)
     };
-    (0..around.len()).map(two_rings).collect()
+    (0..chart.vertices().len()).map(two_rings).collect()
 }
 
 /// The values at the given shares of the total weight.

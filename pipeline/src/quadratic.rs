@@ -140,8 +140,13 @@ pub fn energy(chart: &ClosedChart, nodes: &[GridPoint]) -> f64 {
 }
 
 fn energy_of(chart: &ClosedChart, places: &[[f64; 2]]) -> f64 {
+    energies(chart, places).sum()
+}
+
+/// The Dirichlet energy of every triangle of the closed chart; of `places`, only those of its nodes are used.
+pub(crate) fn energies(chart: &ClosedChart, places: &[[f64; 2]]) -> impl Iterator<Item = f64> {
     let one = |f: usize| element::energy(&element::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| places[n]));
-    (0..chart.triangles().len()).map(one).sum()
+    (0..chart.triangles().len()).map(one)
 }
 
 #[cfg(test)]

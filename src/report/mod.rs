@@ -4,8 +4,9 @@
 mod build;
 
 use crate::outcome::{Reason, Status};
-use crate::settings::{Order, Settings};
+use crate::settings::Settings;
 pub use build::{certificate, chart_checksum, chart_report, repairs, surface};
+use pipeline::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

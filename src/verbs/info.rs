@@ -2,11 +2,10 @@
 
 use super::{Exit, say};
 use crate::inputs;
-use crate::job::{Job, guard, read_file};
-use crate::outcome::{Code, Reason};
+use crate::job::{Job, guard, read_file, repaired};
+use crate::outcome::Reason;
 use crate::report::{self, Counts, Repairs, Surface};
 use crate::settings::Settings;
-use pipeline::repair;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -41,11 +40,7 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
 
 fn answer(job: &Job, settings: &Settings) -> Answer {
     let input = job.path.to_string_lossy().into_owned();
-    let found = guard(|| {
-        let soup = job.read(&read_file(&job.path)?)?;
-        let found = repair(&soup, &pipeline::repair::Settings { weld: settings.weld });
-        found.map_err(|e| Reason::new(Code::OnlyDegenerate, e))
-    });
+    let found = guard(|| repaired(&job.read(&read_file(&job.path)?)?, settings));
     match found {
         Ok(found) => Answer {
             surface: Some(report::surface(&found)),

@@ -4,6 +4,7 @@ mod census;
 mod edges;
 mod intrinsic;
 mod soup;
+mod stars;
 mod surface;
 
 pub(crate) use census::orientation;
@@ -11,4 +12,5 @@ pub use census::{Census, Umbrellas};
 pub use edges::EdgeTable;
 pub use intrinsic::{Metric, TriangleShape};
 pub use soup::{SoupError, TriangleSoup};
+pub use stars::Stars;
 pub use surface::SurfaceMesh;

@@ -124,13 +124,21 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     if draft.triangles.is_empty() {
         return Err(Error::OnlyDegenerate { triangles: soup.triangles().len() });
     }
-    let raw = Census::new(&draft.triangles, &EdgeTable::new(&draft.triangles));
+    let mut edges = EdgeTable::new(&draft.triangles);
+    let raw = Census::new(&draft.triangles, &edges);
     report.unreferenced_points = draft.points.len() - raw.vertices;
     report.duplicate_triangles = draft.drop_duplicates();
-    draft.close_cracks(settings.weld, &mut report);
-    let edges = EdgeTable::new(&draft.triangles);
+    edges = renewed(edges, report.duplicate_triangles.count > 0, &draft.triangles);
+    draft.close_cracks(&edges, settings.weld, &mut report);
+    edges = renewed(edges, report.cracks_closed > 0, &draft.triangles);
     report.flipped_triangles = draft.orient(&edges);
-    Ok(Repaired { mesh: draft.into_mesh(&mut report), raw, report })
+    edges = renewed(edges, report.flipped_triangles.count > 0, &draft.triangles);
+    Ok(Repaired { mesh: draft.into_mesh(edges, &mut report), raw, report })
+}
+
+/// The edges of `triangles`: found again only where the triangles `changed`.
+fn renewed(edges: EdgeTable, changed: bool, triangles: &[[VertexId; 3]]) -> EdgeTable {
+    if changed { EdgeTable::new(triangles) } else { edges }
 }
 
 impl Draft {
@@ -162,14 +170,13 @@ impl Draft {
         dropped
     }
 
-    /// Joins open edges within `weld` of each other, then drops what became degenerate or a copy.
-    fn close_cracks(&mut self, weld: f64, report: &mut Report) {
-        let edges = EdgeTable::new(&self.triangles);
+    /// Joins open edges within `weld` of each other, then drops what became a copy.
+    fn close_cracks(&mut self, edges: &EdgeTable, weld: f64, report: &mut Report) {
         let Some(diagonal) = BoundingBox::of(self.used_points()).map(|b| b.diagonal()) else { return };
         // Powers of two change no digit: distances are measured where they neither overflow nor underflow.
         let scale = unit_scale(diagonal);
         let scaled: Vec<Vec3> = self.points.iter().map(|p| p.map(|c| c * scale)).collect();
-        let closed = cracks::find(&scaled, &self.triangles, &edges, weld * diagonal * scale);
+        let closed = cracks::find(&scaled, &self.triangles, edges, weld * diagonal * scale);
         report.cracks_closed = closed.pairs;
         if closed.pairs == 0 {
             return;
@@ -205,8 +212,7 @@ impl Draft {
     }
 
     /// Gives every umbrella a vertex of its own, drops unused points, and measures.
-    fn into_mesh(self, report: &mut Report) -> SurfaceMesh {
-        let edges = EdgeTable::new(&self.triangles);
+    fn into_mesh(self, edges: EdgeTable, report: &mut Report) -> SurfaceMesh {
         let umbrellas = Umbrellas::new(&self.triangles, &edges);
         let (of_umbrella, welded) = split_vertices(&umbrellas.vertices(&self.triangles), report);
         let renamed = |face: usize| [0, 1, 2].map(|k| of_umbrella[umbrellas.of_corner[3 * face + k] as usize]);
@@ -218,12 +224,11 @@ impl Draft {
         report.mollified_by = metric.mollified_by / metric.scale;
         report.mollified_triangles =
             Found::of((0..corners.len()).filter(|f| metric.flagged[*f]).map(|f| self.source[f]));
-        let split = EdgeTable::new(&triangles);
-        let mut census = Census::new(&triangles, &split);
         // Splitting makes every sheet manifold; what was split is still told, as it must become a seam.
-        census.nonmanifold_edges = edges.iter().filter(|(_, sides)| sides.len() > 2).count();
-        census.nonmanifold_vertices = pinned_vertices(&welded, &triangles, &split);
-        let edges = split;
+        let nonmanifold_edges = edges.iter().filter(|(_, sides)| sides.len() > 2).count();
+        let edges = renewed(edges, report.split_vertices.count > 0, &triangles);
+        let nonmanifold_vertices = pinned_vertices(&welded, &triangles, &edges);
+        let census = Census { nonmanifold_edges, nonmanifold_vertices, ..Census::new(&triangles, &edges) };
         SurfaceMesh { points, triangles, source: self.source, welded, edges, census, metric }
     }
 }

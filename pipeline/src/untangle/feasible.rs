@@ -6,6 +6,7 @@ use super::problem::{Cell, Problem};
 use super::{Effort, on_grid, places, region};
 use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
+use crate::quadratic::energies;
 use crate::sparse::Error;
 
 /// The weights of the barrier, relative to the energy of each triangle.
@@ -25,7 +26,7 @@ const KEPT: f64 = 1e-3;
 pub(super) fn untangle(chart: &ClosedChart, start: &[GridPoint], effort: &mut Effort) -> Option<Vec<GridPoint>> {
     let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
     let mut all = places(start, &centres);
-    let energies = region::energies(chart, &all);
+    let energies: Vec<f64> = energies(chart, &all).collect();
     let mean = energies.iter().sum::<f64>() / chart.own_triangles() as f64;
     let mut problem = problem(chart, &energies, mean);
     let mut x = problem.gather(&all);

@@ -103,11 +103,6 @@ impl Effort {
         self.iterations += outcome.iterations;
         self.decrement = outcome.decrement;
     }
-
-    fn merge(&mut self, other: Self) {
-        self.iterations += other.iterations;
-        self.decrement = self.decrement.max(other.decrement);
-    }
 }
 
 /// Untangles the harmonic map of `chart`; `start` is the valid raised linear map with the same boundary.

@@ -7,14 +7,14 @@
 use super::newton::minimise;
 use super::penalty::{Bound, Penalty};
 use super::problem::{Cell, Places, Problem};
-use super::region::{self, Stars};
+use super::region;
 use super::{Effort, arc, centre_of_hole, places, terms};
 use crate::bernstein::{ExactDet, Validity};
 use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
 use crate::id::{HalfEdgeId, VertexId};
+use crate::mesh::Stars;
 use crate::quadratic::{QuadraticMap, det, invalid_triangles, node_to_grid};
-use crate::sparse::Error;
 
 /// Rings around invalid triangles, one attempt after another.
 const RINGS: [usize; 5] = [2, 4, 7, 12, 20];
@@ -100,7 +100,7 @@ struct Setting<'a> {
 
 impl<'a> Setting<'a> {
     fn new(chart: &'a ClosedChart, start: &[GridPoint]) -> Self {
-        let stars = Stars::new(chart);
+        let stars = Stars::new(chart.triangles(), chart.vertex_count());
         let in_plane = |f: usize| det(chart, start, f).coefficients().iter().sum::<f64>() / 6.0;
         let plane: Vec<f64> = (0..chart.triangles().len()).map(in_plane).collect();
         let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
@@ -132,7 +132,7 @@ impl<'a> Setting<'a> {
         let mut spent = Effort::default();
         let solved = relax(&mut problem, &mut local, &mut spent);
         effort.iterations += spent.iterations;
-        solved.ok()?;
+        solved?;
         let mut moved: Vec<(usize, [f64; 2])> = problem.moved(&local).map(|(n, p)| (n, *p)).collect();
         moved.sort_unstable_by_key(|m| m.0);
         let place = |n: usize| moved.binary_search_by_key(&n, |m| m.0).map_or(x[n], |i| moved[i].1);
@@ -140,7 +140,7 @@ impl<'a> Setting<'a> {
         let mut own = faces.iter().filter(|f| (**f as usize) < self.chart.own_triangles());
         let valid = own.all(|f| ExactDet::new(cell(f)).validity() != Validity::Invalid);
         valid.then(|| {
-            effort.merge(Effort { iterations: 0, ..spent });
+            effort.decrement = effort.decrement.max(spent.decrement);
             moved
         })
     }
@@ -187,11 +187,11 @@ impl<'a> Setting<'a> {
     }
 }
 
-/// Pulls a patch over to the valid side, then lets it relax towards the harmonic map. The error `Singular` also
-/// stands for a patch that does not yield.
-fn relax(problem: &mut Problem, x: &mut Places, effort: &mut Effort) -> Result<(), Error> {
+/// Pulls a patch over to the valid side, then lets it relax towards the harmonic map; `None` where it does not yield,
+/// or its systems cannot be solved.
+fn relax(problem: &mut Problem, x: &mut Places, effort: &mut Effort) -> Option<()> {
     let pattern = problem.pattern();
-    let analysis = pattern.analyse()?;
+    let analysis = pattern.analyse().ok()?;
     problem.scale_weights(PULL);
     let mut least = problem.least(x);
     let mut eps = f64::INFINITY;
@@ -203,11 +203,11 @@ fn relax(problem: &mut Problem, x: &mut Places, effort: &mut Effort) -> Result<(
         // wide comes to rest against the energy while triangles are still inverted.
         eps = (0.6 * eps).min(-0.2 * least).max(NARROWEST);
         let penalty = Penalty::Regularised { eps };
-        effort.add(minimise(problem, (&pattern, &analysis), x, penalty, (STEPS_PER_ROUND, TOLERANCE))?);
+        effort.add(minimise(problem, (&pattern, &analysis), x, penalty, (STEPS_PER_ROUND, TOLERANCE)).ok()?);
         least = problem.least(x);
     }
     if least <= 0.0 {
-        return Err(Error::Singular { unknowns: problem.unknowns() });
+        return None;
     }
     // A barrier that the point clears: a thousandth of the typical size, or half of what is there.
     problem.for_each_bound(x, |c, bound| bound.floor = (1e-3 * bound.scale).min(0.5 * c));
@@ -215,7 +215,7 @@ fn relax(problem: &mut Problem, x: &mut Places, effort: &mut Effort) -> Result<(
     for weight in WEIGHTS {
         problem.scale_weights(weight / last);
         last = weight;
-        effort.add(minimise(problem, (&pattern, &analysis), x, Penalty::Barrier, (STEPS_PER_WEIGHT, TOLERANCE))?);
+        effort.add(minimise(problem, (&pattern, &analysis), x, Penalty::Barrier, (STEPS_PER_WEIGHT, TOLERANCE)).ok()?);
     }
-    Ok(())
+    Some(())
 }

@@ -1,38 +1,11 @@
 //! Regions of a chart: rings around triangles, and what may move inside.
 
 use super::penalty::Bound;
-use super::problem::{ArcCell, Places};
+use super::problem::ArcCell;
 use crate::closed::ClosedChart;
-use crate::element;
 use crate::id::HalfEdgeId;
+use crate::mesh::Stars;
 use crate::union_find::UnionFind;
-
-/// Per vertex of the closed chart, the triangles around it.
-pub(super) struct Stars {
-    starts: Vec<u32>,
-    faces: Vec<u32>,
-}
-
-impl Stars {
-    pub fn new(chart: &ClosedChart) -> Self {
-        let mut starts = vec![0_u32; chart.vertex_count() + 1];
-        chart.triangles().iter().flatten().for_each(|v| starts[v.index() + 1] += 1);
-        (0..chart.vertex_count()).for_each(|v| starts[v + 1] += starts[v]);
-        let mut next = starts.clone();
-        let mut faces = vec![0; starts[chart.vertex_count()] as usize];
-        for (f, t) in chart.triangles().iter().enumerate() {
-            for v in t {
-                faces[next[v.index()] as usize] = f as u32;
-                next[v.index()] += 1;
-            }
-        }
-        Self { starts, faces }
-    }
-
-    pub fn around(&self, vertex: usize) -> &[u32] {
-        &self.faces[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
-    }
-}
 
 /// Triangles around seeds, grouped into parts that share no vertex.
 pub(super) struct Patches {
@@ -129,10 +102,4 @@ pub(super) fn arc_cells(chart: &ClosedChart, wanted: impl Fn(HalfEdgeId) -> bool
         .filter(|(_, h)| wanted(*h))
         .map(|(k, h)| cell(k, h))
         .collect()
-}
-
-/// The Dirichlet energy of every triangle.
-pub(super) fn energies(chart: &ClosedChart, x: &Places) -> Vec<f64> {
-    let one = |f: usize| element::energy(&element::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| x[n]));
-    (0..chart.triangles().len()).map(one).collect()
 }
