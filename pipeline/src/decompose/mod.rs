@@ -6,9 +6,13 @@
 //!
 //! The longest loop becomes the outer one (the first, in a tie): all others are holes.
 
-use crate::atlas::{Atlas, Chart};
-use crate::id::{ChartId, FaceId, HalfEdgeId, VertexId};
-use crate::mesh::{Census, EdgeTable, SurfaceMesh};
+mod assemble;
+mod legality;
+
+use crate::atlas::Atlas;
+use crate::mesh::{Census, SurfaceMesh};
+pub use assemble::assemble;
+pub use legality::Illegal;
 
 /// Why a surface has no atlas.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -16,6 +20,9 @@ pub enum Error {
     /// The surface is no disk and no disk with holes.
     #[error("{}", needs_decomposition(.0))]
     NeedsDecomposition(Box<Census>),
+    /// A chart came out that is none: a fault of planish.
+    #[error(transparent)]
+    Illegal(#[from] Illegal),
 }
 
 fn needs_decomposition(c: &Census) -> String {
@@ -36,60 +43,13 @@ pub fn decompose(mesh: &SurfaceMesh) -> Result<Atlas, Error> {
     if !mesh.census().is_one_chart() {
         return Err(Error::NeedsDecomposition(Box::new(mesh.census().clone())));
     }
-    let faces = (0..mesh.triangles().len()).map(FaceId::at).collect();
-    Ok(Atlas { charts: vec![chart(mesh, ChartId(0), faces)] })
-}
-
-/// The chart of `faces`, ascending, which form a legal chart.
-fn chart(mesh: &SurfaceMesh, id: ChartId, faces: Vec<FaceId>) -> Chart {
-    let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| mesh.triangles()[f.index()]).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
-    let local = |v: VertexId| VertexId::at(vertices.partition_point(|u| *u < v));
-    let triangles: Vec<_> = faces.iter().map(|f| mesh.triangles()[f.index()].map(local)).collect();
-    let edges = EdgeTable::new(&triangles);
-    let shapes = faces.iter().map(|f| mesh.metric().shapes[f.index()]).collect();
-    let flagged = faces.iter().map(|f| mesh.metric().flagged[f.index()]).collect();
-    let mut loops = boundary_loops(&triangles, &edges, vertices.len());
-    let scale = mesh.metric().scale;
-    let mut chart =
-        Chart { id, vertices, faces, triangles, shapes, flagged, scale, edges, outer: vec![], holes: vec![] };
-    let length = |l: &[HalfEdgeId]| l.iter().map(|h| chart.length(*h)).sum::<f64>();
-    let lengths: Vec<f64> = loops.iter().map(|l| length(l)).collect();
-    let longest = (0..loops.len()).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
-    chart.outer = loops.remove(longest);
-    chart.holes = loops;
-    chart
-}
-
-/// The boundary loops, each from its least half-edge on, in the order of these. Every boundary vertex has one
-/// boundary half-edge out and one in, so following them returns to the start.
-fn boundary_loops(triangles: &[[VertexId; 3]], edges: &EdgeTable, vertices: usize) -> Vec<Vec<HalfEdgeId>> {
-    let from = |h: HalfEdgeId| triangles[h.face().index()][h.side()];
-    let to = |h: HalfEdgeId| triangles[h.face().index()][h.next().side()];
-    let boundary: Vec<HalfEdgeId> =
-        (0..3 * triangles.len()).map(HalfEdgeId::at).filter(|h| edges.is_boundary(*h)).collect();
-    let mut out: Vec<Option<HalfEdgeId>> = vec![None; vertices];
-    boundary.iter().for_each(|h| out[from(*h).index()] = Some(*h));
-    let mut loops = Vec::new();
-    for start in boundary {
-        let mut turn = Vec::new();
-        let mut at = from(start);
-        // Taking the half-edge away ends the walk: each is visited once.
-        while let Some(h) = out[at.index()].take() {
-            turn.push(h);
-            at = to(h);
-        }
-        if !turn.is_empty() {
-            loops.push(turn);
-        }
-    }
-    loops
+    Ok(assemble(mesh, &vec![0; mesh.triangles().len()])?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::id::VertexId;
     use crate::repair::{Settings, repair};
     use crate::{mesh::TriangleSoup, shapes};
 
