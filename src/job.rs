@@ -253,7 +253,7 @@ fn stages(
     let found = repaired(soup, settings)?;
     report.surface = Some(report::surface(&found));
     report.repairs = Some(report::repairs(&found.report));
-    let atlas = decompose(&found.mesh).map_err(|e| Reason::new(Code::NeedsDecomposition, e))?;
+    let atlas = decompose(&found.mesh, &Default::default()).map_err(|e| Reason::new(Code::NeedsDecomposition, e))?;
     let mut done = Vec::new();
     for chart in atlas.charts() {
         clock.next(report, Stage::Map);

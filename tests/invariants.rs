@@ -8,7 +8,7 @@ use planish::formats::{self, Kind};
 /// The certified chart of a soup, if it is one chart.
 fn chart(soup: &TriangleSoup) -> Option<CertifiedChart> {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-    let atlas = decompose(&mesh).ok()?;
+    let atlas = decompose(&mesh, &Default::default()).ok()?;
     Some(finish_chart(map_chart(&atlas.charts()[0], Order::Quadratic).expect("maps")))
 }
 

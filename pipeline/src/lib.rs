@@ -32,7 +32,7 @@
 //!
 //! let soup = shapes::disk(8);
 //! let surface = repair(&soup, &Default::default())?.mesh;
-//! let atlas = decompose(&surface)?;
+//! let atlas = decompose(&surface, &Default::default())?;
 //! for chart in atlas.charts() {
 //!     let done = finish_chart(map_chart(chart, Order::Quadratic)?);
 //!     let certificate = done.certified.certificate();

@@ -7,11 +7,22 @@
 //! The longest loop becomes the outer one (the first, in a tie): all others are holes.
 
 mod assemble;
+mod dual;
 mod legality;
+mod merge;
+mod predict;
+mod regions;
+mod voronoi;
 
 use crate::atlas::Atlas;
 use crate::mesh::{Census, SurfaceMesh};
+use crate::id::FaceId;
 pub use assemble::assemble;
+use dual::Dual;
+use merge::{Limits, merge};
+use predict::CellGraph;
+use regions::{Regions, planar};
+use voronoi::{bisect_until, farthest_first};
 pub use legality::Illegal;
 
 /// Why a surface has no atlas.
@@ -35,16 +46,51 @@ fn needs_decomposition(c: &Census) -> String {
     )
 }
 
+/// What charts must respect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The largest area ratio of a chart (see [`crate::distortion::Summary::area_ratio`]). At least 10; default 1e6.
+    pub max_area_ratio: f64,
+    /// The largest number of triangles of a chart; default none.
+    pub max_triangles: usize,
+    /// Whether all inner loops of a chart must be holes of the surface.
+    pub strict_disks: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { max_area_ratio: 1e6, max_triangles: usize::MAX, strict_disks: false }
+    }
+}
+
 /// Cuts `mesh` into charts.
 ///
 /// # Errors
-/// [`Error::NeedsDecomposition`] where one chart cannot carry the surface.
-pub fn decompose(mesh: &SurfaceMesh) -> Result<Atlas, Error> {
-    if !mesh.census().is_one_chart() {
-        return Err(Error::NeedsDecomposition(Box::new(mesh.census().clone())));
-    }
-    Ok(assemble(mesh, &vec![0; mesh.triangles().len()])?)
+/// [`Error`].
+pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error> {
+    let dual = Dual::new(mesh);
+    let cells = farthest_first(&dual, |_, size| (size / 8).min(CELLS));
+    let alone: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
+    let cells = bisect_until(&dual, cells, |groups| planar(&dual, &alone, groups));
+    let graph = CellGraph::new(&dual, &cells);
+    let coarse = farthest_first(&graph, |_, size| size.min(REGIONS));
+    let coarse = bisect_until(&graph, coarse, |groups| planar(&dual, &cells.of, groups));
+    let mut regions = Regions::new(&dual, &cells.of, coarse.of, coarse.count);
+    let limits = Limits {
+        area_ratio: settings.max_area_ratio,
+        triangles: settings.max_triangles,
+        strict_disks: settings.strict_disks,
+    };
+    merge(&mut regions, &graph, &limits);
+    let labels: Vec<u32> = (0..mesh.triangles().len()).map(|f| regions.of(FaceId::at(f))).collect();
+    Ok(assemble(mesh, &labels)?)
 }
+
+/// Cells per component, at most.
+const CELLS: usize = 800;
+
+/// Regions per component to begin with.
+const REGIONS: usize = 48;
 
 #[cfg(test)]
 mod tests {
@@ -54,7 +100,7 @@ mod tests {
     use crate::{mesh::TriangleSoup, shapes};
 
     fn atlas(soup: &TriangleSoup) -> Result<Atlas, Error> {
-        decompose(&repair(soup, &Settings::default()).expect("a surface is left").mesh)
+        decompose(&repair(soup, &Settings::default()).expect("a surface is left").mesh, &Default::default())
     }
 
     #[test]

@@ -1,0 +1,112 @@
+//! The dual graph of a surface: triangles, joined where they share an edge along which both run consistently.
+
+use super::voronoi::Graph;
+use crate::id::{FaceId, HalfEdgeId};
+use crate::mesh::SurfaceMesh;
+use crate::space::{Vec3, cross, distance, midpoint, norm, sub};
+
+const NONE: HalfEdgeId = HalfEdgeId(u32::MAX);
+
+/// A surface as decomposition sees it. Lengths are in the unit of the metric.
+pub(super) struct Dual<'a> {
+    pub mesh: &'a SurfaceMesh,
+    /// Per half-edge the one on the other side, or [`NONE`].
+    across: Vec<HalfEdgeId>,
+    /// Per edge, whether it is a feature: no cell crosses it.
+    pub feature: Vec<bool>,
+    points: Vec<Vec3>,
+    centroids: Vec<Vec3>,
+    areas: Vec<f64>,
+}
+
+impl<'a> Dual<'a> {
+    pub(super) fn new(mesh: &'a SurfaceMesh) -> Self {
+        let scale = mesh.metric().scale;
+        let points: Vec<Vec3> = mesh.points().iter().map(|p| p.map(|c| c * scale)).collect();
+        let triangles = mesh.triangles();
+        let from = |h: HalfEdgeId| triangles[h.face().index()][h.side()];
+        let across = |h: HalfEdgeId| mesh.edges().twin(h).filter(|t| from(*t) != from(h)).unwrap_or(NONE);
+        let centroid = |t: &[crate::id::VertexId; 3]| {
+            let [a, b, c] = t.map(|v| points[v.index()]);
+            [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
+        };
+        Self {
+            across: (0..3 * triangles.len()).map(|h| across(HalfEdgeId::at(h))).collect(),
+            feature: vec![false; mesh.edges().len()],
+            centroids: triangles.iter().map(centroid).collect(),
+            areas: mesh.metric().shapes.iter().map(|s| s.area()).collect(),
+            mesh,
+            points,
+        }
+    }
+
+    /// The half-edge on the other side, running the other way; none at the boundary, and where the triangles
+    /// disagree about the orientation.
+    pub(super) fn across(&self, h: HalfEdgeId) -> Option<HalfEdgeId> {
+        Some(self.across[h.index()]).filter(|t| *t != NONE)
+    }
+
+    /// Whether the edge along `h` is a feature.
+    pub(super) fn is_feature(&self, h: HalfEdgeId) -> bool {
+        self.feature[self.mesh.edges().edge(h).index()]
+    }
+
+    /// The vertex at which `h` begins.
+    pub(super) fn from(&self, h: HalfEdgeId) -> usize {
+        self.mesh.triangles()[h.face().index()][h.side()].index()
+    }
+
+    /// The vertex at which `h` ends.
+    pub(super) fn to(&self, h: HalfEdgeId) -> usize {
+        self.from(h.next())
+    }
+
+    pub(super) fn point(&self, vertex: usize) -> Vec3 {
+        self.points[vertex]
+    }
+
+    pub(super) fn centroid(&self, face: usize) -> Vec3 {
+        self.centroids[face]
+    }
+
+    /// The mollified area.
+    pub(super) fn area(&self, face: usize) -> f64 {
+        self.areas[face]
+    }
+
+    /// The normal times the doubled true area.
+    pub(super) fn area_vector(&self, face: usize) -> Vec3 {
+        let [a, b, c] = self.mesh.triangles()[face].map(|v| self.points[v.index()]);
+        cross(sub(b, a), sub(c, a))
+    }
+
+    /// The true length of the edge along `h`.
+    pub(super) fn length(&self, h: HalfEdgeId) -> f64 {
+        distance(self.points[self.from(h)], self.points[self.to(h)])
+    }
+
+    /// The middle of the edge along `h`.
+    pub(super) fn middle(&self, h: HalfEdgeId) -> Vec3 {
+        midpoint(self.points[self.from(h)], self.points[self.to(h)])
+    }
+
+    pub(super) fn half_edges(&self) -> impl Iterator<Item = HalfEdgeId> + use<> {
+        (0..self.across.len() as u32).map(HalfEdgeId)
+    }
+}
+
+impl Graph for Dual<'_> {
+    fn len(&self) -> usize {
+        self.centroids.len()
+    }
+
+    /// Neighbours across edges that are no features, at the distance of the centroids by way of the edge's middle.
+    fn each_neighbour(&self, face: usize, mut visit: impl FnMut(usize, f64)) {
+        for h in (0..3).map(|k| HalfEdgeId::side_of(FaceId::at(face), k)) {
+            let Some(other) = self.across(h).filter(|_| !self.is_feature(h)) else { continue };
+            let g = other.face().index();
+            let m = self.middle(h);
+            visit(g, norm(sub(self.centroids[face], m)) + norm(sub(self.centroids[g], m)));
+        }
+    }
+}
