@@ -76,16 +76,14 @@ fn candidate(
     version: &[u32],
 ) -> Option<Candidate> {
     let union = regions.union(a, b)?;
-    let cost = allowed(regions, limits, (a, b), &union).then(|| cost(regions, graph, limits, (a, b), &union))??;
+    let cost = allowed(regions, limits, &union).then(|| cost(regions, graph, limits, (a, b), &union))??;
     Some(Candidate { cost, pair: (a, b), versions: (version[a as usize], version[b as usize]) })
 }
 
 /// Whether the union may be a chart.
-fn allowed(regions: &Regions, limits: &Limits, (a, b): (u32, u32), union: &Union) -> bool {
-    let before = regions.all[a as usize].pinches + regions.all[b as usize].pinches;
+fn allowed(regions: &Regions, limits: &Limits, union: &Union) -> bool {
     let seams = |l: &&Vec<_>| l.iter().any(|h| regions.dual.across(*h).is_some());
-    union.region.is_planar(&union.outline)
-        && union.outline.pinches <= before
+    union.region.is_chart(&union.outline)
         && union.region.faces <= limits.triangles
         && (!limits.strict_disks || union.outline.loops.iter().filter(seams).count() <= 1)
         && 2.0 * union.shared_feature <= union.shared

@@ -21,7 +21,7 @@ pub use assemble::assemble;
 use dual::Dual;
 use merge::{Limits, merge};
 use predict::CellGraph;
-use regions::{Regions, planar};
+use regions::{Regions, legal};
 use voronoi::{bisect_until, farthest_first};
 pub use legality::Illegal;
 
@@ -69,12 +69,12 @@ impl Default for Settings {
 /// [`Error`].
 pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error> {
     let dual = Dual::new(mesh);
-    let cells = farthest_first(&dual, |_, size| (size / 8).min(CELLS));
+    let cells = farthest_first(&dual, |size| (size / 8).min(CELLS));
     let alone: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
-    let cells = bisect_until(&dual, cells, |groups| planar(&dual, &alone, groups));
+    let cells = bisect_until(&dual, cells, |groups| legal(&dual, &alone, groups));
     let graph = CellGraph::new(&dual, &cells);
-    let coarse = farthest_first(&graph, |_, size| size.min(REGIONS));
-    let coarse = bisect_until(&graph, coarse, |groups| planar(&dual, &cells.of, groups));
+    let coarse = farthest_first(&graph, |size| size.min(REGIONS));
+    let coarse = bisect_until(&graph, coarse, |groups| legal(&dual, &cells.of, groups));
     let mut regions = Regions::new(&dual, &cells.of, coarse.of, coarse.count);
     let limits = Limits {
         area_ratio: settings.max_area_ratio,

@@ -21,14 +21,13 @@ pub(super) struct Region {
     pub area: f64,
     /// The sum of the area vectors.
     pub normal: Vec3,
-    /// How often the boundary visits a vertex again.
-    pub pinches: usize,
 }
 
 /// The boundary of a region, walked.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outline {
     pub loops: Vec<Vec<HalfEdgeId>>,
+    /// How often it visits a vertex again.
     pub pinches: usize,
     /// Whether the region lies on both sides of an edge of its boundary: a surface that cannot be oriented there.
     pub meets_itself: bool,
@@ -85,9 +84,6 @@ impl<'a> Regions<'a> {
             }
         }
         made.measure(&on_boundary);
-        for r in 0..count {
-            made.all[r].pinches = made.outline(r as u32, r as u32, &made.all[r].boundary.clone()).pinches;
-        }
         made
     }
 
@@ -199,13 +195,11 @@ impl<'a> Regions<'a> {
             area: ra.area + rb.area,
             normal: [0, 1, 2].map(|k| ra.normal[k] + rb.normal[k]),
             boundary: vec![],
-            pinches: 0,
         };
         let shared = gone.iter().map(|h| self.dual.length(*h)).sum();
         let shared_feature = gone.iter().filter(|h| self.dual.is_feature(**h)).map(|h| self.dual.length(*h)).sum();
         let outline = self.outline(a, b, &boundary);
         region.boundary = boundary;
-        region.pinches = outline.pinches;
         Some(Union { region, outline, shared, shared_feature })
     }
 
@@ -226,20 +220,20 @@ impl<'a> Regions<'a> {
 }
 
 impl Region {
-    /// Whether the region, opened where it touches itself, is a disk with or without holes.
-    pub(super) fn is_planar(&self, outline: &Outline) -> bool {
+    /// Whether the region is a disk with or without holes, whose boundary visits no vertex twice.
+    pub(super) fn is_chart(&self, outline: &Outline) -> bool {
         let euler = self.inside as i64 + (self.boundary.len() as i64 - self.faces as i64) / 2;
-        !outline.loops.is_empty() && euler + outline.loops.len() as i64 == 2 && !outline.meets_itself
+        outline.pinches == 0 && !outline.loops.is_empty() && euler + outline.loops.len() as i64 == 2 && !outline.meets_itself
     }
 }
 
-/// Per group of cells, whether it is a disk with or without holes (opened where it touches itself).
-pub(super) fn planar(dual: &Dual, cell_of: &[u32], groups: &super::voronoi::Cells) -> Vec<bool> {
+/// Per group of cells, whether it may be a chart.
+pub(super) fn legal(dual: &Dual, cell_of: &[u32], groups: &super::voronoi::Cells) -> Vec<bool> {
     let mut regions = Regions::new(dual, cell_of, groups.of.clone(), groups.count);
     (0..groups.count as u32)
         .map(|r| {
             let outline = regions.outline_of(r);
-            regions.all[r as usize].is_planar(&outline)
+            regions.all[r as usize].is_chart(&outline)
         })
         .collect()
 }

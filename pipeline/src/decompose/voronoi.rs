@@ -6,7 +6,9 @@
 //! on n evenly spread nodes about n log k visits.
 
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeSet, BinaryHeap};
+
+const NO_CELL: u32 = u32::MAX;
 
 /// Nodes `0..len` and what they are joined to.
 pub(super) trait Graph {
@@ -54,11 +56,17 @@ struct Growth<'a, G> {
     reached: Vec<usize>,
 }
 
-impl<G: Graph> Growth<'_, G> {
+impl<'a, G: Graph> Growth<'a, G> {
+    fn new(graph: &'a G) -> Self {
+        let n = graph.len();
+        let (distance, of) = (vec![f64::INFINITY; n], vec![NO_CELL; n]);
+        Self { graph, distance, of, heap: BinaryHeap::new(), reached: Vec::new() }
+    }
+
     /// Adds a seed; every node that comes closer changes to its cell. Ends because a node is visited only with a
     /// distance below its last one.
     fn seed(&mut self, node: usize, cell: u32) {
-        if self.of[node] == u32::MAX {
+        if self.of[node] == NO_CELL {
             self.reached.push(node);
         }
         self.distance[node] = 0.0;
@@ -72,7 +80,7 @@ impl<G: Graph> Growth<'_, G> {
                 (&mut self.distance, &mut self.of, &mut self.heap, &mut self.reached);
             self.graph.each_neighbour(node as usize, |other, step| {
                 if distance + step < distances[other] {
-                    if of[other] == u32::MAX {
+                    if of[other] == NO_CELL {
                         reached.push(other);
                     }
                     distances[other] = distance + step;
@@ -82,44 +90,54 @@ impl<G: Graph> Growth<'_, G> {
             });
         }
     }
-}
 
-/// Cells of `graph`: in every connected component `seeds(node, size)` of them (`node` is one of its nodes), at least
-/// one and at most `size`. Cells are numbered component by component.
-pub(super) fn farthest_first<G: Graph>(graph: &G, seeds: impl Fn(usize, usize) -> usize) -> Cells {
-    let n = graph.len();
-    let mut growth =
-        Growth { graph, distance: vec![f64::INFINITY; n], of: vec![u32::MAX; n], heap: BinaryHeap::new(), reached: Vec::new() };
-    let mut count = 0;
-    for start in 0..n {
-        if growth.of[start] != u32::MAX {
-            continue;
+    /// Forgets the cells of these nodes.
+    fn clear(&mut self, nodes: &[usize]) {
+        for node in nodes {
+            self.distance[*node] = f64::INFINITY;
+            self.of[*node] = NO_CELL;
         }
+    }
+
+    /// Cuts the connected component of `start`, which has no cells yet, into cells numbered from `first` on:
+    /// `wanted(size)` of them, at least one and at most `size`. Returns the next number.
+    fn component(&mut self, start: usize, first: u32, wanted: impl Fn(usize) -> usize) -> u32 {
         // A first sweep finds the component and its node farthest from where it was entered: a tip.
-        growth.seed(start, count);
-        let mut nodes = std::mem::take(&mut growth.reached);
+        self.seed(start, first);
+        let mut nodes = std::mem::take(&mut self.reached);
         nodes.sort_unstable();
-        let farthest = |d: &[f64]| nodes.iter().copied().max_by(|a, b| d[*a].total_cmp(&d[*b]).then(b.cmp(a)));
-        let tip = farthest(&growth.distance).unwrap_or(start);
-        nodes.iter().for_each(|i| growth.distance[*i] = f64::INFINITY);
-        growth.seed(tip, count);
-        count += 1;
-        let mut far: BinaryHeap<Far> = nodes.iter().map(|i| Far(growth.distance[*i], *i as u32)).collect();
-        let wanted = seeds(start, nodes.len()).clamp(1, nodes.len());
-        let mut is_seed = std::collections::BTreeSet::from([tip]);
-        let mut made = 1;
-        while made < wanted
+        let distance = &self.distance;
+        let farthest = nodes.iter().copied().max_by(|a, b| distance[*a].total_cmp(&distance[*b]).then(b.cmp(a)));
+        let tip = farthest.unwrap_or(start);
+        self.clear(&nodes);
+        self.seed(tip, first);
+        self.reached.clear();
+        let mut far: BinaryHeap<Far> = nodes.iter().map(|i| Far(self.distance[*i], *i as u32)).collect();
+        let mut seeds = BTreeSet::from([tip]);
+        let wanted = wanted(nodes.len()).clamp(1, nodes.len());
+        while seeds.len() < wanted
             && let Some(Far(distance, node)) = far.pop()
         {
-            let now = growth.distance[node as usize];
+            let now = self.distance[node as usize];
             if now < distance {
                 // Distances only shrink: each entry returns at most once per seed that changed it.
                 far.push(Far(now, node));
-            } else if is_seed.insert(node as usize) {
-                growth.seed(node as usize, count);
-                count += 1;
-                made += 1;
+            } else if seeds.insert(node as usize) {
+                self.seed(node as usize, first + seeds.len() as u32 - 1);
             }
+        }
+        first + seeds.len() as u32
+    }
+}
+
+/// Cells of `graph`: in every connected component `wanted(size)` of them, at least one and at most `size`. Cells
+/// are numbered component by component.
+pub(super) fn farthest_first<G: Graph>(graph: &G, wanted: impl Fn(usize) -> usize) -> Cells {
+    let mut growth = Growth::new(graph);
+    let mut count = 0;
+    for start in 0..graph.len() {
+        if growth.of[start] == NO_CELL {
+            count = growth.component(start, count, &wanted);
         }
     }
     Cells { of: growth.of, count: count as usize }
@@ -167,12 +185,37 @@ impl<G: Graph> Graph for Within<'_, G> {
 /// the others smaller.
 pub(super) fn bisect_until<G: Graph>(graph: &G, mut cells: Cells, mut fine: impl FnMut(&Cells) -> Vec<bool>) -> Cells {
     loop {
-        let fine = fine(&cells);
-        if fine.iter().all(|f| *f) {
+        let fine = fine(&cells);  of {} bad", fine.iter().filter(|f| !**f).count(), fine.len()); }
+        let coarse: Vec<usize> = (0..cells.of.len()).filter(|i| !fine[cells.of[*i] as usize]).collect();
+        if coarse.is_empty() {
             return cells;
         }
         let within = Within { graph, of: &cells.of };
-        let halves = |node: usize, _: usize| if fine[cells.of[node] as usize] { 1 } else { 2 };
-        cells = farthest_first(&within, halves);
+        let mut growth = Growth::new(&within);
+        growth.of.clone_from(&cells.of);
+        growth.clear(&coarse);
+        let mut count = cells.count as u32;
+        for node in coarse {
+            if growth.of[node] == NO_CELL {
+                count = growth.component(node, count, |_| 2);
+            }
+        }
+        cells = renumbered(growth.of);
     }
+}
+
+/// Numbers cells in the order of their first nodes.
+fn renumbered(mut of: Vec<u32>) -> Cells {
+    let highest = of.iter().max().map_or(0, |m| *m as usize + 1);
+    let mut number = vec![NO_CELL; highest];
+    let mut count = 0;
+    for cell in &mut of {
+        let new = &mut number[*cell as usize];
+        if *new == NO_CELL {
+            *new = count;
+            count += 1;
+        }
+        *cell = *new;
+    }
+    Cells { of, count: count as usize }
 }
