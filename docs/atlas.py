@@ -41,6 +41,12 @@ class Seams:
     corners: list           # places where other than two edges of one kind meet
 
 
+def find(out):
+    """Name and folder of every result below OUT, by name."""
+    found = {p.parent for name in ("report.json", "surface.vtu") for p in out.rglob(name)}
+    return sorted((f.relative_to(out).as_posix() if f != out else f.resolve().name, f) for f in found)
+
+
 def load(path):
     """A .vtu file as VTK's grid; an error where it is missing or damaged."""
     if not path.exists():

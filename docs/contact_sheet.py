@@ -425,8 +425,7 @@ def sheet(tiles, columns):
 
 def folders(out, order):
     """The result folders below OUT, the named ones first."""
-    found = {p.parent for name in ("report.json", "surface.vtu") for p in out.rglob(name)}
-    names = sorted((f.relative_to(out).as_posix(), f) for f in found)
+    names = results.find(out)
     first = {name: i for i, name in enumerate(order)}
     missing = set(order) - {name for name, _ in names}
     if missing or not names:
@@ -448,8 +447,7 @@ def options():
 def main():
     arguments = options()
     studio = Studio(arguments.size)
-    tiles = [make_tile(folder, name if name != "." else folder.resolve().name, studio)
-             for name, folder in folders(arguments.out, arguments.order)]
+    tiles = [make_tile(folder, name, studio) for name, folder in folders(arguments.out, arguments.order)]
     columns = arguments.columns or min(2, len(tiles))
     sheet(tiles, max(1, columns)).save(arguments.sheet)
 
