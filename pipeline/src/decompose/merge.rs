@@ -90,15 +90,8 @@ fn allowed(regions: &Regions, limits: &Limits, union: &Union) -> bool {
 }
 
 /// The cost of a union; none where it would be too distorted.
-fn cost(
-    regions: &Regions,
-    graph: &CellGraph,
-    limits: &Limits,
-    (a, b): (u32, u32),
-    union: &Union,
-) -> Option<f64> {
-    let cells: Vec<u32> =
-        [a, b].iter().flat_map(|r| regions.all[*r as usize].cells.iter().copied()).collect();
+fn cost(regions: &Regions, graph: &CellGraph, limits: &Limits, (a, b): (u32, u32), union: &Union) -> Option<f64> {
+    let cells: Vec<u32> = [a, b].iter().flat_map(|r| regions.all[*r as usize].cells.iter().copied()).collect();
     let ratio = area_ratio(regions.dual, regions.cell_of, graph, &cells, &union.outline);
     if ratio > limits.area_ratio {
         return None;

@@ -15,15 +15,15 @@ mod regions;
 mod voronoi;
 
 use crate::atlas::Atlas;
-use crate::mesh::{Census, SurfaceMesh};
 use crate::id::FaceId;
+use crate::mesh::{Census, SurfaceMesh};
 pub use assemble::assemble;
 use dual::Dual;
+pub use legality::Illegal;
 use merge::{Limits, merge};
 use predict::CellGraph;
 use regions::{Regions, legal};
 use voronoi::{bisect_until, farthest_first};
-pub use legality::Illegal;
 
 /// Why a surface has no atlas.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -9,8 +9,8 @@ use super::dual::Dual;
 use super::regions::Outline;
 use super::voronoi::{Cells, Graph};
 use crate::id::HalfEdgeId;
-use crate::sparse::{PRESCRIBED, Pattern};
 use crate::space::{Vec3, distance};
+use crate::sparse::{PRESCRIBED, Pattern};
 use std::f64::consts::TAU;
 
 /// The graph of cells.
@@ -236,4 +236,3 @@ fn quantile(sorted: &[(f64, f64)], share: f64) -> f64 {
     });
     reached.or(sorted.last()).map_or(1.0, |d| d.0)
 }
-

@@ -69,7 +69,8 @@ impl Stamps {
 impl<'a> Regions<'a> {
     /// One region per group of cells: `of_cell` tells the group of each cell, of `count` groups.
     pub(super) fn new(dual: &'a Dual<'a>, cell_of: &'a [u32], of_cell: Vec<u32>, count: usize) -> Self {
-        let stamps = Stamps { now: 0, half_edges: vec![0; 3 * cell_of.len()], vertices: vec![0; dual.mesh.points().len()] };
+        let stamps =
+            Stamps { now: 0, half_edges: vec![0; 3 * cell_of.len()], vertices: vec![0; dual.mesh.points().len()] };
         let mut made = Self { dual, cell_of, of_cell, all: vec![Region::default(); count], stamps };
         for cell in 0..made.of_cell.len() {
             made.all[made.of_cell[cell] as usize].cells.push(cell as u32);
@@ -223,7 +224,10 @@ impl Region {
     /// Whether the region is a disk with or without holes, whose boundary visits no vertex twice.
     pub(super) fn is_chart(&self, outline: &Outline) -> bool {
         let euler = self.inside as i64 + (self.boundary.len() as i64 - self.faces as i64) / 2;
-        outline.pinches == 0 && !outline.loops.is_empty() && euler + outline.loops.len() as i64 == 2 && !outline.meets_itself
+        outline.pinches == 0
+            && !outline.loops.is_empty()
+            && euler + outline.loops.len() as i64 == 2
+            && !outline.meets_itself
     }
 }
 

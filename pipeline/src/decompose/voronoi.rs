@@ -76,8 +76,7 @@ impl<'a, G: Graph> Growth<'a, G> {
             if distance > self.distance[node as usize] || self.of[node as usize] != cell {
                 continue;
             }
-            let (distances, of, heap, reached) =
-                (&mut self.distance, &mut self.of, &mut self.heap, &mut self.reached);
+            let (distances, of, heap, reached) = (&mut self.distance, &mut self.of, &mut self.heap, &mut self.reached);
             self.graph.each_neighbour(node as usize, |other, step| {
                 if distance + step < distances[other] {
                     if of[other] == NO_CELL {
@@ -185,7 +184,7 @@ impl<G: Graph> Graph for Within<'_, G> {
 /// the others smaller.
 pub(super) fn bisect_until<G: Graph>(graph: &G, mut cells: Cells, mut fine: impl FnMut(&Cells) -> Vec<bool>) -> Cells {
     loop {
-        let fine = fine(&cells);  of {} bad", fine.iter().filter(|f| !**f).count(), fine.len()); }
+        let fine = fine(&cells);
         let coarse: Vec<usize> = (0..cells.of.len()).filter(|i| !fine[cells.of[*i] as usize]).collect();
         if coarse.is_empty() {
             return cells;
