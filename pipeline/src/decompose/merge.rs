@@ -1,8 +1,9 @@
 //! Growing charts: starting from a few dozen compact regions, the best pair of neighbours is united again and
 //! again, as long as unions are legal and not too distorted.
 
+use super::dual::Dual;
 use super::predict::{CellGraph, area_ratio};
-use super::regions::{Regions, Union};
+use super::regions::{Outline, Region, Regions, Union};
 use crate::space::norm;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -16,11 +17,28 @@ pub(super) struct Limits {
     pub strict_disks: bool,
 }
 
-/// How much a round outline counts against a small area ratio (per unit of isoperimetric excess).
-const ROUNDNESS: f64 = 0.6;
+impl Limits {
+    /// Whether a region may be a chart, its distortion apart.
+    pub(super) fn allow(&self, dual: &Dual, region: &Region, outline: &Outline) -> bool {
+        let seams = |l: &&Vec<_>| l.iter().any(|h| dual.across(*h).is_some());
+        region.is_chart(outline)
+            && region.faces <= self.triangles
+            && (!self.strict_disks || outline.loops.iter().filter(seams).count() <= 1)
+    }
+}
 
-/// How much the spread of normals counts (0: a plane, 1: a closed surface).
-const SPREAD: f64 = 0.5;
+/// What makes a union cheap. All terms are pure numbers of about the same size.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weights {
+    /// Per decade of the area ratio.
+    pub ratio: f64,
+    /// Per unit of isoperimetric excess (0: a round disk).
+    pub roundness: f64,
+    /// Per unit of spread of the normals (0: a plane, 1: a closed surface).
+    pub spread: f64,
+    /// For the share of the smaller outline that vanishes.
+    pub shared: f64,
+}
 
 /// A union that may be made: the greatest is the cheapest.
 #[derive(Clone, Copy, PartialEq)]
@@ -28,6 +46,8 @@ struct Candidate {
     cost: f64,
     pair: (u32, u32),
     versions: (u32, u32),
+    /// The area ratio of the union; before it is known, none: the cost is then an estimate from below.
+    ratio: Option<f64>,
 }
 
 impl Eq for Candidate {}
@@ -44,61 +64,81 @@ impl Ord for Candidate {
     }
 }
 
-/// Unites neighbours until no union is allowed. Ends because every union leaves one region less.
-pub(super) fn merge(regions: &mut Regions, graph: &CellGraph, limits: &Limits) {
-    let mut version = vec![0_u32; regions.all.len()];
-    let mut heap = BinaryHeap::new();
-    for a in 0..regions.all.len() as u32 {
-        for b in regions.neighbours(a).into_iter().filter(|b| a < *b) {
-            heap.extend(candidate(regions, graph, limits, (a, b), &version));
-        }
-    }
-    while let Some(best) = heap.pop() {
-        let (a, b) = best.pair;
-        if best.versions != (version[a as usize], version[b as usize]) {
-            continue;
-        }
-        let Some(union) = regions.union(a, b) else { continue };
-        regions.unite(a, b, union);
-        version[a as usize] += 1;
-        version[b as usize] += 1;
-        for c in regions.neighbours(a).into_iter().filter(|c| *c != a) {
-            heap.extend(candidate(regions, graph, limits, (a.min(c), a.max(c)), &version));
-        }
-    }
+/// Regions while they are united.
+pub(super) struct Merge<'a, 'b> {
+    pub regions: &'b mut Regions<'a>,
+    pub graph: &'b CellGraph,
+    pub limits: Limits,
+    pub weights: Weights,
+    /// Per region its area ratio, as far as it is known, else 1.
+    pub ratios: Vec<f64>,
 }
 
-fn candidate(
-    regions: &mut Regions,
-    graph: &CellGraph,
-    limits: &Limits,
-    (a, b): (u32, u32),
-    version: &[u32],
-) -> Option<Candidate> {
-    let union = regions.union(a, b)?;
-    let cost = allowed(regions, limits, &union).then(|| cost(regions, graph, limits, (a, b), &union))??;
-    Some(Candidate { cost, pair: (a, b), versions: (version[a as usize], version[b as usize]) })
-}
-
-/// Whether the union may be a chart.
-fn allowed(regions: &Regions, limits: &Limits, union: &Union) -> bool {
-    let seams = |l: &&Vec<_>| l.iter().any(|h| regions.dual.across(*h).is_some());
-    union.region.is_chart(&union.outline)
-        && union.region.faces <= limits.triangles
-        && (!limits.strict_disks || union.outline.loops.iter().filter(seams).count() <= 1)
-        && 2.0 * union.shared_feature <= union.shared
-}
-
-/// The cost of a union; none where it would be too distorted.
-fn cost(regions: &Regions, graph: &CellGraph, limits: &Limits, (a, b): (u32, u32), union: &Union) -> Option<f64> {
-    let cells: Vec<u32> = [a, b].iter().flat_map(|r| regions.all[*r as usize].cells.iter().copied()).collect();
-    let ratio = area_ratio(regions.dual, regions.cell_of, graph, &cells, &union.outline);
-    if ratio > limits.area_ratio {
-        return None;
+impl Merge<'_, '_> {
+    /// Unites neighbours until no union is allowed. Ends because every union leaves one region less, and every
+    /// candidate is judged once.
+    pub(super) fn run(&mut self) {
+        let mut version = vec![0_u32; self.regions.all.len()];
+        let mut heap = BinaryHeap::new();
+        for a in 0..version.len() as u32 {
+            for b in self.regions.neighbours(a).into_iter().filter(|b| a < *b) {
+                heap.extend(self.candidate((a, b), &version));
+            }
+        }
+        while let Some(best) = heap.pop() {
+            let (a, b) = best.pair;
+            if best.versions != (version[a as usize], version[b as usize]) {
+                continue;
+            }
+            let Some(ratio) = best.ratio else {
+                heap.extend(self.judged(best));
+                continue;
+            };
+            let Some(union) = self.regions.union(a, b) else { continue };
+            self.regions.unite(a, b, union);
+            self.ratios[a as usize] = ratio;
+            version[a as usize] += 1;
+            version[b as usize] += 1;
+            for c in self.regions.neighbours(a).into_iter().filter(|c| *c != a) {
+                heap.extend(self.candidate((a.min(c), a.max(c)), &version));
+            }
+        }
     }
-    let region = &union.region;
-    let perimeter: f64 = region.boundary.iter().map(|h| regions.dual.length(*h)).sum();
-    let excess = perimeter / (4.0 * PI * region.area).sqrt() - 1.0;
-    let spread = 1.0 - norm(region.normal) / (2.0 * region.area);
-    Some(ratio.log10() + ROUNDNESS * excess.max(0.0) + SPREAD * spread)
+
+    /// A legal union. Its ratio is not known yet: it is taken to be that of its parts, as solving for it costs most,
+    /// and many candidates are overtaken before.
+    fn candidate(&mut self, (a, b): (u32, u32), version: &[u32]) -> Option<Candidate> {
+        let union = self.regions.union(a, b).filter(|u| self.is_allowed(u))?;
+        let ratio = self.ratios[a as usize].max(self.ratios[b as usize]);
+        let versions = (version[a as usize], version[b as usize]);
+        Some(Candidate { cost: self.cost((a, b), &union, ratio), pair: (a, b), versions, ratio: None })
+    }
+
+    /// The candidate with its own area ratio; none where that is too large.
+    fn judged(&mut self, candidate: Candidate) -> Option<Candidate> {
+        let (a, b) = candidate.pair;
+        let union = self.regions.union(a, b)?;
+        let cells_of = |r: u32| self.regions.all[r as usize].cells.iter().copied();
+        let cells: Vec<u32> = cells_of(a).chain(cells_of(b)).collect();
+        let ratio = area_ratio(self.regions.dual, self.regions.cell_of, self.graph, &cells, &union.outline);
+        let judged = Candidate { cost: self.cost((a, b), &union, ratio), ratio: Some(ratio), ..candidate };
+        (ratio <= self.limits.area_ratio).then_some(judged)
+    }
+
+    /// Whether the union may be a chart, its distortion apart.
+    fn is_allowed(&self, union: &Union) -> bool {
+        self.limits.allow(self.regions.dual, &union.region, &union.outline)
+            && 2.0 * union.shared_feature <= union.shared
+    }
+
+    fn cost(&self, (a, b): (u32, u32), union: &Union, ratio: f64) -> f64 {
+        let length = |boundary: &[_]| boundary.iter().map(|h| self.regions.dual.length(*h)).sum::<f64>();
+        let outline = |r: u32| length(&self.regions.all[r as usize].boundary);
+        let region = &union.region;
+        let excess = length(&region.boundary) / (4.0 * PI * region.area).sqrt() - 1.0;
+        let spread = 1.0 - norm(region.normal) / (2.0 * region.area);
+        let w = &self.weights;
+        w.ratio * ratio.log10() + w.roundness * excess.max(0.0) + w.spread * spread
+            - w.shared * union.shared / outline(a).min(outline(b))
+    }
 }

@@ -10,20 +10,26 @@ mod assemble;
 mod dual;
 mod legality;
 mod merge;
+mod network;
 mod predict;
 mod regions;
+mod search;
+mod shortest;
+mod straighten;
 mod voronoi;
 
 use crate::atlas::Atlas;
-use crate::id::FaceId;
 use crate::mesh::{Census, SurfaceMesh};
 pub use assemble::assemble;
 use dual::Dual;
 pub use legality::Illegal;
-use merge::{Limits, merge};
+use merge::Limits;
+use network::Network;
 use predict::CellGraph;
-use regions::{Regions, legal};
-use voronoi::{bisect_until, farthest_first};
+use regions::Regions;
+use search::Search;
+use straighten::straighten;
+use voronoi::{Cells, bisect_until, farthest_first};
 
 /// Why a surface has no atlas.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -69,28 +75,33 @@ impl Default for Settings {
 /// [`Error`].
 pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error> {
     let dual = Dual::new(mesh);
-    let cells = farthest_first(&dual, |size| (size / 8).min(CELLS));
-    let alone: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
-    let cells = bisect_until(&dual, cells, |groups| legal(&dual, &alone, groups));
-    let graph = CellGraph::new(&dual, &cells);
-    let coarse = farthest_first(&graph, |size| size.min(REGIONS));
-    let coarse = bisect_until(&graph, coarse, |groups| legal(&dual, &cells.of, groups));
-    let mut regions = Regions::new(&dual, &cells.of, coarse.of, coarse.count);
     let limits = Limits {
         area_ratio: settings.max_area_ratio,
         triangles: settings.max_triangles,
         strict_disks: settings.strict_disks,
     };
-    merge(&mut regions, &graph, &limits);
-    let labels: Vec<u32> = (0..mesh.triangles().len()).map(|f| regions.of(FaceId::at(f))).collect();
-    Ok(assemble(mesh, &labels)?)
+    let cells = cells(&dual, &limits);
+    let graph = CellGraph::new(&dual, &cells);
+    let charts = Search { dual: &dual, cells: &cells, graph: &graph, limits }.run();
+    let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
+    let mut network = Network::new(&dual, labels, limits);
+    straighten(&mut network);
+    Ok(assemble(mesh, &network.labels)?)
+}
+
+/// Legal cells of about the same size.
+fn cells(dual: &Dual, limits: &Limits) -> Cells {
+    let cells = farthest_first(dual, |_, size| (size / 8).min(CELLS));
+    let alone: Vec<u32> = (0..dual.mesh.triangles().len() as u32).collect();
+    bisect_until(dual, cells, |groups| {
+        let mut regions = Regions::new(dual, &alone, groups.of.clone(), groups.count);
+        let outlines: Vec<_> = (0..groups.count as u32).map(|r| regions.outline_of(r)).collect();
+        regions.all.iter().zip(&outlines).map(|(region, outline)| limits.allow(dual, region, outline)).collect()
+    })
 }
 
 /// Cells per component, at most.
 const CELLS: usize = 800;
-
-/// Regions per component to begin with.
-const REGIONS: usize = 48;
 
 #[cfg(test)]
 mod tests {

@@ -230,14 +230,3 @@ impl Region {
             && !outline.meets_itself
     }
 }
-
-/// Per group of cells, whether it may be a chart.
-pub(super) fn legal(dual: &Dual, cell_of: &[u32], groups: &super::voronoi::Cells) -> Vec<bool> {
-    let mut regions = Regions::new(dual, cell_of, groups.of.clone(), groups.count);
-    (0..groups.count as u32)
-        .map(|r| {
-            let outline = regions.outline_of(r);
-            regions.all[r as usize].is_chart(&outline)
-        })
-        .collect()
-}

@@ -99,8 +99,8 @@ impl<'a, G: Graph> Growth<'a, G> {
     }
 
     /// Cuts the connected component of `start`, which has no cells yet, into cells numbered from `first` on:
-    /// `wanted(size)` of them, at least one and at most `size`. Returns the next number.
-    fn component(&mut self, start: usize, first: u32, wanted: impl Fn(usize) -> usize) -> u32 {
+    /// `wanted(start, size)` of them, at least one and at most `size`. Returns the next number.
+    fn component(&mut self, start: usize, first: u32, wanted: impl Fn(usize, usize) -> usize) -> u32 {
         // A first sweep finds the component and its node farthest from where it was entered: a tip.
         self.seed(start, first);
         let mut nodes = std::mem::take(&mut self.reached);
@@ -113,7 +113,7 @@ impl<'a, G: Graph> Growth<'a, G> {
         self.reached.clear();
         let mut far: BinaryHeap<Far> = nodes.iter().map(|i| Far(self.distance[*i], *i as u32)).collect();
         let mut seeds = BTreeSet::from([tip]);
-        let wanted = wanted(nodes.len()).clamp(1, nodes.len());
+        let wanted = wanted(start, nodes.len()).clamp(1, nodes.len());
         while seeds.len() < wanted
             && let Some(Far(distance, node)) = far.pop()
         {
@@ -129,9 +129,9 @@ impl<'a, G: Graph> Growth<'a, G> {
     }
 }
 
-/// Cells of `graph`: in every connected component `wanted(size)` of them, at least one and at most `size`. Cells
-/// are numbered component by component.
-pub(super) fn farthest_first<G: Graph>(graph: &G, wanted: impl Fn(usize) -> usize) -> Cells {
+/// Cells of `graph`: in every connected component `wanted(node, size)` of them (`node` is its first one), at least
+/// one and at most `size`. Cells are numbered component by component.
+pub(super) fn farthest_first<G: Graph>(graph: &G, wanted: impl Fn(usize, usize) -> usize) -> Cells {
     let mut growth = Growth::new(graph);
     let mut count = 0;
     for start in 0..graph.len() {
@@ -196,25 +196,27 @@ pub(super) fn bisect_until<G: Graph>(graph: &G, mut cells: Cells, mut fine: impl
         let mut count = cells.count as u32;
         for node in coarse {
             if growth.of[node] == NO_CELL {
-                count = growth.component(node, count, |_| 2);
+                count = growth.component(node, count, |_, _| 2);
             }
         }
-        cells = renumbered(growth.of);
+        cells = Cells::renumbered(growth.of);
     }
 }
 
-/// Numbers cells in the order of their first nodes.
-fn renumbered(mut of: Vec<u32>) -> Cells {
-    let highest = of.iter().max().map_or(0, |m| *m as usize + 1);
-    let mut number = vec![NO_CELL; highest];
-    let mut count = 0;
-    for cell in &mut of {
-        let new = &mut number[*cell as usize];
-        if *new == NO_CELL {
-            *new = count;
-            count += 1;
+impl Cells {
+    /// The cells of these labels, numbered in the order of their first nodes.
+    pub(super) fn renumbered(mut of: Vec<u32>) -> Self {
+        let highest = of.iter().max().map_or(0, |m| *m as usize + 1);
+        let mut number = vec![NO_CELL; highest];
+        let mut count = 0;
+        for cell in &mut of {
+            let new = &mut number[*cell as usize];
+            if *new == NO_CELL {
+                *new = count;
+                count += 1;
+            }
+            *cell = *new;
         }
-        *cell = *new;
+        Self { of, count: count as usize }
     }
-    Cells { of, count: count as usize }
 }

@@ -1,0 +1,196 @@
+//! Straight seams: shortest paths between corners, shortest loops, and corners where seams are shortest.
+//!
+//! Each seam is replaced by the shortest path along edges inside the two charts at its sides; a closed one third by
+//! third. Each corner of three seams moves to where the sum of the three ways is least, and a seam that ends at the
+//! open boundary slides along it. A change is kept if it is shorter and all charts stay legal: so the total length
+//! falls with every change, and the number of rounds is fixed.
+
+use super::dual::Dual;
+use super::network::{Network, Path};
+use super::shortest::{Bounds, Tree, length, reversed, weight};
+use crate::id::HalfEdgeId;
+
+/// Rounds over all seams and corners.
+const ROUNDS: usize = 3;
+
+/// A change must be shorter by this share.
+const GAIN: f64 = 1e-6;
+
+/// How far from a corner its seams are laid anew, in parts of the size of a chart.
+const REACH: f64 = 0.35;
+
+/// Seams while they are straightened.
+struct Straightening<'n, 'a> {
+    network: &'n mut Network<'a>,
+    dual: &'a Dual<'a>,
+    trees: [Tree; 3],
+    reach: f64,
+}
+
+/// Straightens all seams of `network`.
+pub(super) fn straighten(network: &mut Network) {
+    let dual = network.dual;
+    let tree = || Tree::new(dual.mesh.points().len());
+    let area: f64 = (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum();
+    let reach = REACH * (area / network.charts().max(1) as f64).sqrt();
+    let mut work = Straightening { network, dual, trees: [tree(), tree(), tree()], reach };
+    for _ in 0..ROUNDS {
+        let before = work.total();
+        work.seams();
+        work.corners();
+        if work.total() > (1.0 - 1e-3) * before {
+            return;
+        }
+    }
+}
+
+impl Straightening<'_, '_> {
+    fn total(&self) -> f64 {
+        let seams = self.dual.half_edges().filter(|h| self.network.is_seam(*h));
+        0.5 * seams.map(|h| weight(self.dual, h)).sum::<f64>()
+    }
+
+    /// One pass over all seams.
+    fn seams(&mut self) {
+        for path in self.network.curves() {
+            let closed = self.dual.from(path[0]) == self.dual.to(path[path.len() - 1]);
+            if closed {
+                self.shorten_loop(path);
+            } else if self.shorten(&path).is_none() {
+                self.shorten_pieces(path);
+            }
+        }
+    }
+
+    /// The shortest path in the place of a seam (or a part of one); none where that is not shorter, or not legal.
+    fn shorten(&mut self, path: &[HalfEdgeId]) -> Option<Vec<HalfEdgeId>> {
+        let (first, last) = (*path.first()?, *path.last()?);
+        let (left, right) = (self.network.label(first), self.network.label(self.dual.across(first)?));
+        let (from, to) = (self.dual.from(first), self.dual.to(last));
+        let labels = [left, right];
+        let before = length(self.dual, path);
+        self.network.lift(path);
+        let bounds = Bounds { labels: &labels, length: (1.0 - GAIN) * before, target: Some(to), to_open: false };
+        self.trees[0].grow(self.network, from, &bounds);
+        let found = self.trees[0].distance(to).map(|_| self.trees[0].path(self.dual, to));
+        let laid = found.filter(|p| {
+            let path = Path { half_edges: p.clone(), left, right };
+            self.network.lay(&[path], &labels)
+        });
+        if laid.is_none() {
+            self.network.put_back(path);
+        }
+        laid
+    }
+
+    /// A long seam piece by piece: first half, middle, second half.
+    fn shorten_pieces(&mut self, mut path: Vec<HalfEdgeId>) {
+        for quarter in [0, 1, 2] {
+            let n = path.len();
+            let range = quarter * n / 4..(quarter + 2) * n / 4;
+            if range.len() < 2 {
+                continue;
+            }
+            if let Some(piece) = self.shorten(&path[range.clone()].to_vec()) {
+                path.splice(range, piece);
+            }
+        }
+    }
+
+    /// A closed seam: its thirds, then thirds that begin in the middle of these.
+    fn shorten_loop(&mut self, mut path: Vec<HalfEdgeId>) {
+        for turn in 0..12 {
+            let third = path.len() / 3;
+            if third < 2 {
+                return;
+            }
+            if let Some(piece) = self.shorten(&path[..third].to_vec()) {
+                path.splice(..third, piece);
+            }
+            let step = if turn % 3 == 2 { third / 2 } else { third };
+            path.rotate_left(step);
+        }
+    }
+
+    /// One pass over all corners.
+    fn corners(&mut self) {
+        for vertex in 0..self.dual.mesh.points().len() {
+            match (self.network.is_open(vertex), self.network.degree(vertex)) {
+                (false, 3) => self.move_corner(vertex),
+                (true, 1) => self.slide(vertex),
+                _ => None,
+            };
+        }
+    }
+
+    /// Moves a corner of three seams to where they are shortest.
+    fn move_corner(&mut self, corner: usize) -> Option<()> {
+        let starts = self.network.seams_at(corner);
+        let arms: Vec<_> = starts.iter().map(|h| self.network.follow(*h, self.reach)).collect();
+        let ends: Vec<usize> = arms.iter().map(|a| self.dual.to(a[a.len() - 1])).collect();
+        let labels: Vec<u32> = starts.iter().map(|h| self.network.label(*h)).collect();
+        let distinct = |v: &[u32]| v[0] != v[1] && v[1] != v[2] && v[2] != v[0];
+        if !distinct(&labels) || ends.contains(&corner) {
+            return None;
+        }
+        let before: f64 = arms.iter().map(|a| length(self.dual, a)).sum();
+        let sides: Vec<_> = starts
+            .iter()
+            .filter_map(|h| Some((self.network.label(*h), self.network.label(self.dual.across(*h)?))))
+            .collect();
+        arms.iter().for_each(|a| self.network.lift(a));
+        let moved = self.meeting(&ends, &labels, before).is_some_and(|ways| {
+            let path = |(half_edges, (left, right)): (&Vec<HalfEdgeId>, &(u32, u32))| Path {
+                half_edges: half_edges.clone(),
+                left: *left,
+                right: *right,
+            };
+            let paths: Vec<Path> = ways.iter().zip(&sides).map(path).collect();
+            self.network.lay(&paths, &labels)
+        });
+        if !moved {
+            arms.iter().for_each(|a| self.network.put_back(a));
+        }
+        Some(())
+    }
+
+    /// The ways from the vertex where the sum of the distances to three `ends` is least, if it is less than `before`.
+    fn meeting(&mut self, ends: &[usize], labels: &[u32], before: f64) -> Option<Vec<Vec<HalfEdgeId>>> {
+        let bounds = Bounds { labels, length: (1.0 - GAIN) * before, target: None, to_open: false };
+        for (tree, end) in self.trees.iter_mut().zip(ends) {
+            tree.grow(self.network, *end, &bounds);
+        }
+        let sum = |v: usize| Some(self.trees[0].distance(v)? + self.trees[1].distance(v)? + self.trees[2].distance(v)?);
+        let known = self.trees[0].reached.iter().filter(|v| !ends.contains(v)).filter_map(|v| Some((sum(*v)?, *v)));
+        let (least, vertex) = known.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
+        let ways: Vec<_> = self.trees.iter().map(|t| reversed(self.dual, &t.path(self.dual, vertex))).collect();
+        let mut on_way: Vec<usize> = ways.iter().flatten().map(|h| self.dual.to(*h)).collect();
+        let all = on_way.len();
+        on_way.sort_unstable();
+        on_way.dedup();
+        (least < (1.0 - GAIN) * before && on_way.len() == all).then_some(ways)
+    }
+
+    /// Moves the end of a seam along the open boundary to where the seam is shortest.
+    fn slide(&mut self, end: usize) -> Option<()> {
+        let start = *self.network.seams_at(end).first()?;
+        let arm = self.network.follow(start, self.reach);
+        let root = self.dual.to(arm[arm.len() - 1]);
+        let (left, right) = (self.network.label(start), self.network.label(self.dual.across(start)?));
+        let labels = [left, right];
+        let before = length(self.dual, &arm);
+        self.network.lift(&arm);
+        let bounds = Bounds { labels: &labels, length: (1.0 - GAIN) * before, target: None, to_open: true };
+        let tree = &mut self.trees[0];
+        tree.grow(self.network, root, &bounds);
+        let open = tree.reached.iter().copied().find(|v| *v != root && self.network.is_open(*v));
+        let moved = open.is_some_and(|v| {
+            let half_edges = reversed(self.dual, &tree.path(self.dual, v));
+            self.network.lay(&[Path { half_edges, left, right }], &labels)
+        });
+        if !moved {
+            self.network.put_back(&arm);
+        }
+        Some(())
+    }
+}
