@@ -3,6 +3,7 @@
 //! so and pass.
 
 use crate::interop::assert_vtk_agrees;
+use crate::legality::assert_legal;
 use crate::support::{Out, planish, root};
 use planish::outcome::{Code, Status};
 use planish::report::Report;
@@ -60,6 +61,7 @@ fn real_disks_are_certified_proven_again_and_opened_by_vtk() {
         assert!((-1e-12..1e-3).contains(&excess), "{name}: {excess}");
         let checked = planish(["check".as_ref(), out.of(name).as_os_str()]);
         assert_eq!(checked.code, Some(0), "{name}: {}", checked.err);
+        assert_legal(&out.of(name));
     }
     let bunny = &reports.iter().find(|r| r.0 == "bunny_stanford.stl").expect("the bunny").1.charts[0];
     assert!(bunny.distortion.area_ratio > 1e9, "far more than one chart should bear: {:?}", bunny.distortion);
@@ -76,6 +78,7 @@ fn tubes_are_certified_or_refused_as_needing_a_split() {
         match report.status {
             Status::Certified => {
                 assert_eq!(planish(["check".as_ref(), out.of(&name).as_os_str()]).code, Some(0), "{name}");
+                assert_legal(&out.of(&name));
             }
             _ => assert_eq!(report.reason.expect("a reason").code, Code::NeedsSplit, "{name}"),
         }

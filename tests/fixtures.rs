@@ -1,5 +1,6 @@
 //! The fixtures: what they are, and what becomes of them.
 
+use crate::legality::assert_legal;
 use crate::support::{Out, fixture, planish, root};
 use planish::outcome::{Code, Status};
 
@@ -46,6 +47,7 @@ fn every_fixture_ends_as_it_should_and_is_proven_again() {
             assert_eq!((report.status, report.reason), (Status::Certified, None), "{name}");
             assert_eq!(checked.code, Some(0), "{name}: {}", checked.err);
             assert!(checked.out.contains("proven one-to-one"), "{}", checked.out);
+            assert_legal(&out.of(name));
         } else {
             let reason = report.reason.expect("a reason");
             assert_eq!((report.status, reason.code), (Status::Refused, Code::NeedsDecomposition), "{name}");

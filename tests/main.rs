@@ -5,5 +5,6 @@ mod corpus;
 mod fixtures;
 mod interop;
 mod invariants;
+mod legality;
 mod run;
 mod support;

@@ -177,8 +177,13 @@ def theirs(path, h, limit):
     found.update(ended=cost["code"] is not None, peak_mb=cost["peak_mb"])
     if "mesh" not in found:
         found["cpu"] = cost["cpu"]
-        found.setdefault("errors", []).append(complaint(said))
+        found.setdefault("errors", []).append(complaint(said) if found["ended"] else unended(found["phases"], limit))
     return found
+
+
+def unended(phases, limit):
+    """What is told of a chain that was stopped."""
+    return f"did not end in {limit:g} s of CPU; done by then: {', '.join(phases) or 'nothing'}"
 
 
 # Our chain.
@@ -191,7 +196,7 @@ def ours(path, h, arguments):
         found = {"run": cost, "errors": []}
         folder = Path(out) / path.name
         if not (folder / "report.json").exists():
-            found["errors"].append(complaint(said))
+            found["errors"].append(complaint(said) if cost["code"] is not None else unended([], arguments.limit))
             return found
         report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
         found.update(status=report["status"], charts=len(report["charts"]), timing=report.get("timing"))
@@ -210,7 +215,9 @@ def remesh(folder, limit, found):
     cost, said = spend([sys.executable, gmsh_program(), "remesh.geo", "-2", "-o", mesh.name], limit, folder)
     found["remesh"] = cost
     found["errors"] += [line.strip() for line in said.splitlines() if line.startswith("Error")][:5]
-    if mesh.exists():
+    if cost["code"] is None:
+        found["errors"].append(unended(["planish run"], limit))
+    elif mesh.exists():
         _, found["mesh"], said = child("--mesh-quality", mesh, limit=limit)
     else:
         found["errors"].append(complaint(said))
