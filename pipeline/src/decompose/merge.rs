@@ -120,7 +120,8 @@ impl Merge<'_, '_> {
         let union = self.regions.union(a, b)?;
         let cells_of = |r: u32| self.regions.all[r as usize].cells.iter().copied();
         let cells: Vec<u32> = cells_of(a).chain(cells_of(b)).collect();
-        let ratio = area_ratio(self.regions.dual, self.regions.cell_of, self.graph, &cells, &union.outline);
+        let loops = &union.outline.loops;
+        let (ratio, _) = area_ratio(self.regions.dual, self.regions.cell_of, self.graph, &cells, loops);
         let judged = Candidate { cost: self.cost((a, b), &union, ratio), ratio: Some(ratio), ..candidate };
         (ratio <= self.limits.area_ratio).then_some(judged)
     }

@@ -7,6 +7,13 @@ use super::dual::Dual;
 use super::merge::Limits;
 use super::regions::{Outline, Region};
 use crate::id::{FaceId, HalfEdgeId};
+use crate::union_find::UnionFind;
+
+/// A chart keeps at least this share of its area.
+const LEAST: f64 = 0.5;
+
+/// Marks vertices where the surface does not end.
+const INNER: u32 = u32::MAX;
 
 /// A path along edges: half-edges from end to end, with the label that shall lie on its left and on its right.
 #[derive(Clone, Debug)]
@@ -21,13 +28,19 @@ pub(super) struct Network<'a> {
     pub dual: &'a Dual<'a>,
     pub labels: Vec<u32>,
     limits: Limits,
+    /// Per label, its area at first: it keeps at least half of it.
+    least: Vec<f64>,
+    areas: Vec<f64>,
+    /// Per label, its triangles, the vertices inside it, and the half-edges around it.
     sizes: Vec<usize>,
+    inside: Vec<usize>,
+    boundaries: Vec<Vec<HalfEdgeId>>,
     /// Per edge, whether it is a seam.
     seam: Vec<bool>,
     /// Per vertex, the number of seam edges at it.
     degree: Vec<u32>,
-    /// Per vertex, whether the surface ends there.
-    open: Vec<bool>,
+    /// Per vertex, the open loop of the surface through it, or [`INNER`].
+    open: Vec<u32>,
     /// Per vertex, one half-edge that begins there.
     out: Vec<HalfEdgeId>,
     marks: Marks,
@@ -49,32 +62,65 @@ impl<'a> Network<'a> {
         let mut made = Self {
             dual,
             limits,
+            least: vec![0.0; count],
+            areas: vec![0.0; count],
             sizes: vec![0; count],
+            inside: vec![0; count],
+            boundaries: vec![Vec::new(); count],
             seam: vec![false; edges],
             degree: vec![0; vertices],
-            open: vec![false; vertices],
+            open: open_loops(dual),
             out: vec![HalfEdgeId(0); vertices],
             marks: Marks { now: 0, faces: vec![0; faces], vertices: vec![0; vertices], half_edges: vec![0; 3 * faces] },
             labels,
         };
-        made.labels.iter().for_each(|l| made.sizes[*l as usize] += 1);
+        for (f, label) in made.labels.iter().enumerate() {
+            made.sizes[*label as usize] += 1;
+            made.areas[*label as usize] += dual.area(f);
+        }
+        made.least = made.areas.iter().map(|a| LEAST * a).collect();
         for h in dual.half_edges() {
             made.out[dual.from(h)] = h;
             match dual.across(h) {
-                None => [dual.from(h), dual.to(h)].into_iter().for_each(|v| made.open[v] = true),
-                Some(t) if made.label(t) != made.label(h) && h < t => made.set_seam(h, true),
-                Some(_) => {}
+                None => {}
+                Some(t) => {
+                    made.mark_seam(h, made.label(t) != made.label(h));
+                }
             }
+            if made.bounds(h, made.label(h)) {
+                let label = made.label(h) as usize;
+                made.boundaries[label].push(h);
+            }
+        }
+        for v in 0..vertices {
+            made.count_inside(v, 1);
         }
         made
     }
 
-    fn set_seam(&mut self, h: HalfEdgeId, seam: bool) {
+    /// Makes the edge along `h` a seam or none.
+    fn mark_seam(&mut self, h: HalfEdgeId, seam: bool) {
         let edge = self.dual.mesh.edges().edge(h).index();
         if std::mem::replace(&mut self.seam[edge], seam) != seam {
             for v in [self.dual.from(h), self.dual.to(h)] {
                 self.degree[v] = if seam { self.degree[v] + 1 } else { self.degree[v] - 1 };
             }
+        }
+    }
+
+    /// As [`Self::mark_seam`], with the count of inner vertices.
+    fn set_seam(&mut self, h: HalfEdgeId, seam: bool) {
+        let ends = [self.dual.from(h), self.dual.to(h)];
+        ends.iter().for_each(|v| self.count_inside(*v, -1));
+        self.mark_seam(h, seam);
+        ends.iter().for_each(|v| self.count_inside(*v, 1));
+    }
+
+    /// Counts a vertex (or no more) if it lies inside a chart: that of the triangle of its half-edge [`Self::out`].
+    fn count_inside(&mut self, vertex: usize, by: isize) {
+        if self.degree[vertex] == 0 && !self.is_open(vertex) {
+            let count = &mut self.inside[self.labels[self.out[vertex].face().index()] as usize];
+            *count = count.wrapping_add_signed(by);
         }
     }
 
@@ -95,12 +141,17 @@ impl<'a> Network<'a> {
 
     /// Whether the surface ends at a vertex.
     pub(super) fn is_open(&self, vertex: usize) -> bool {
-        self.open[vertex]
+        self.open[vertex] != INNER
+    }
+
+    /// Whether two vertices lie on the same open loop of the surface.
+    pub(super) fn on_one_loop(&self, a: usize, b: usize) -> bool {
+        self.is_open(a) && self.open[a] == self.open[b]
     }
 
     /// Whether seams meet or end at a vertex.
     pub(super) fn is_corner(&self, vertex: usize) -> bool {
-        self.degree[vertex] > 0 && (self.degree[vertex] != 2 || self.open[vertex])
+        self.degree[vertex] > 0 && (self.degree[vertex] != 2 || self.is_open(vertex))
     }
 
     /// Calls `visit` for every half-edge that begins at `vertex` and has one on its other side. A fan that is open on
@@ -190,30 +241,44 @@ impl<'a> Network<'a> {
         path.iter().for_each(|h| self.set_seam(*h, true));
     }
 
-    /// Lays seams in the place of lifted ones: the triangles up to the other seams change their labels. Undone (and
-    /// `false`) where one of the charts `labels` would be illegal or too large, or lose or gain half of itself.
-    pub(super) fn lay(&mut self, paths: &[Path], labels: &[u32]) -> bool {
+    /// Lays seams in the place of `lifted` ones: the triangles up to the other seams change their labels. Undone, with
+    /// the lifted seams put back (and `false`), where one of the charts `labels` would be illegal or too large, or
+    /// smaller than half of what it was at first.
+    pub(super) fn lay(&mut self, lifted: &[HalfEdgeId], paths: &[Path], labels: &[u32]) -> bool {
         self.marks.now += 1;
         let added: Vec<HalfEdgeId> = paths.iter().flat_map(|p| p.half_edges.iter().copied()).collect();
         self.put_back(&added);
-        let most = labels.iter().map(|l| self.sizes[*l as usize] / 2 + 1).min().unwrap_or(0);
         let mut changed = Vec::new();
         let fits = self.flood(paths, labels, &mut changed)
-            && changed.len() <= most
-            && labels.iter().all(|l| self.is_legal(*l));
+            && {
+                let enough = labels.iter().all(|l| self.areas[*l as usize] >= self.least[*l as usize]);
+                enough
+            }
+            && {
+                self.renew_boundaries(labels, &added);
+                labels.iter().all(|l| self.is_legal(*l))
+            };
         if !fits {
             for (face, label) in changed.into_iter().rev() {
                 self.relabel(face, label);
             }
             self.lift(&added);
+            self.put_back(lifted);
+            self.renew_boundaries(labels, lifted);
         }
         fits
     }
 
     fn relabel(&mut self, face: FaceId, label: u32) -> u32 {
+        let vertices = self.dual.mesh.triangles()[face.index()].map(|v| v.index());
+        let owned = vertices.into_iter().filter(|v| self.out[*v].face() == face).collect::<Vec<_>>();
+        owned.iter().for_each(|v| self.count_inside(*v, -1));
         let old = std::mem::replace(&mut self.labels[face.index()], label);
+        owned.iter().for_each(|v| self.count_inside(*v, 1));
         self.sizes[old as usize] -= 1;
         self.sizes[label as usize] += 1;
+        self.areas[old as usize] -= self.dual.area(face.index());
+        self.areas[label as usize] += self.dual.area(face.index());
         old
     }
 
@@ -266,32 +331,45 @@ impl<'a> Network<'a> {
         true
     }
 
-    /// Whether the triangles of a label form a chart within the limits. Costs their number.
+    /// Whether the triangles of a label form a chart within the limits, judged by its boundary as in
+    /// [`super::regions`]. (A label that falls apart and gets a handle at once would pass: see [`Self::is_sound`].)
     fn is_legal(&mut self, label: u32) -> bool {
-        self.marks.now += 1;
-        let now = self.marks.now;
-        let Some(seed) = self.labels.iter().position(|l| *l == label) else { return false };
-        let mut region = Region::default();
-        let mut vertices = 0;
-        let mut stack = vec![FaceId::at(seed)];
-        self.marks.faces[seed] = now;
-        while let Some(face) = stack.pop() {
-            region.faces += 1;
-            for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
-                vertices += usize::from(std::mem::replace(&mut self.marks.vertices[self.dual.from(h)], now) != now);
-                match self.dual.across(h).filter(|t| self.label(*t) == label) {
-                    None => region.boundary.push(h),
-                    Some(t) => {
-                        if std::mem::replace(&mut self.marks.faces[t.face().index()], now) != now {
-                            stack.push(t.face());
-                        }
-                    }
-                }
+        let boundary = std::mem::take(&mut self.boundaries[label as usize]);
+        let outline = self.outline(label, &boundary);
+        let (faces, inside) = (self.sizes[label as usize], self.inside[label as usize]);
+        let region = Region { faces, inside, boundary, ..Region::default() };
+        let legal = self.limits.allow(self.dual, &region, &outline);
+        self.boundaries[label as usize] = region.boundary;
+        legal
+    }
+
+    /// Brings the boundaries of charts up to date: what is none any more goes, what was laid comes.
+    fn renew_boundaries(&mut self, labels: &[u32], laid: &[HalfEdgeId]) {
+        for label in labels {
+            let mut boundary = std::mem::take(&mut self.boundaries[*label as usize]);
+            boundary.retain(|h| self.bounds(*h, *label));
+            let sides = laid.iter().flat_map(|h| [Some(*h), self.dual.across(*h)]).flatten();
+            boundary.extend(sides.filter(|h| self.bounds(*h, *label)));
+            boundary.sort_unstable();
+            boundary.dedup();
+            self.boundaries[*label as usize] = boundary;
+        }
+    }
+
+    /// Whether `h` bounds the chart `label`.
+    fn bounds(&self, h: HalfEdgeId, label: u32) -> bool {
+        self.label(h) == label && self.dual.across(h).is_none_or(|t| self.label(t) != label)
+    }
+
+    /// Whether every chart is connected: the one thing that [`Self::lay`] takes on trust.
+    pub(super) fn is_sound(&self) -> bool {
+        let mut sets = UnionFind::new(self.labels.len());
+        for h in self.dual.half_edges() {
+            if let Some(t) = self.dual.across(h).filter(|t| self.label(*t) == self.label(h)) {
+                sets.unite(h.face().index(), t.face().index());
             }
         }
-        let outline = self.outline(label, &region.boundary);
-        region.inside = vertices.saturating_sub(region.boundary.len());
-        region.faces == self.sizes[label as usize] && self.limits.allow(self.dual, &region, &outline)
+        sets.labels().1 == self.charts()
     }
 
     /// Walks along the boundary of a label. See [`super::regions`].
@@ -320,4 +398,16 @@ impl<'a> Network<'a> {
         }
         outline
     }
+}
+
+/// Per vertex, the open loop through it (its least vertex), or [`INNER`].
+fn open_loops(dual: &Dual) -> Vec<u32> {
+    let vertices = dual.mesh.points().len();
+    let mut sets = UnionFind::new(vertices);
+    let mut open = vec![false; vertices];
+    for h in dual.half_edges().filter(|h| dual.across(*h).is_none()) {
+        sets.unite(dual.from(h), dual.to(h));
+        (open[dual.from(h)], open[dual.to(h)]) = (true, true);
+    }
+    (0..vertices).map(|v| if open[v] { sets.find(v) as u32 } else { INNER }).collect()
 }

@@ -6,7 +6,6 @@
 //! density of its Dirichlet energy; the ratio is that of the extreme quantiles of this density over stars of cells.
 
 use super::dual::Dual;
-use super::regions::Outline;
 use super::voronoi::{Cells, Graph};
 use crate::id::HalfEdgeId;
 use crate::space::{Vec3, distance};
@@ -116,18 +115,32 @@ struct System<'a> {
     rim: Vec<(u32, f64, [f64; 2])>,
 }
 
-/// The area ratio of a harmonic map of `cells` (those of a region with this outline): at least 1, infinite where
-/// there is none in doubles.
-pub(super) fn area_ratio(dual: &Dual, cell_of: &[u32], graph: &CellGraph, cells: &[u32], outline: &Outline) -> f64 {
-    let mut system = System::new(graph, cells);
-    let length = |l: &&Vec<HalfEdgeId>| l.iter().map(|h| dual.length(*h)).sum::<f64>();
-    let lengths: Vec<f64> = outline.loops.iter().map(|l| length(&l)).collect();
-    let outer = (0..lengths.len()).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
-    for (i, turn) in outline.loops.iter().enumerate() {
-        let arcs = arcs(dual, cell_of, turn);
-        if i == outer { system.prescribe(&arcs) } else { system.close(&arcs, lengths[i] / TAU) }
-    }
-    system.solve().map_or(f64::INFINITY, |places| system.ratio(&places))
+/// Loops shorter than this share of the longest are never the outer one.
+const LONG: f64 = 0.5;
+
+/// The area ratio of a harmonic map of `cells`, whose union has these loops, and the best choice of the outer one
+/// among the long ones. At least 1, infinite where there is no map in doubles.
+pub(super) fn area_ratio(
+    dual: &Dual,
+    cell_of: &[u32],
+    graph: &CellGraph,
+    cells: &[u32],
+    loops: &[Vec<HalfEdgeId>],
+) -> (f64, usize) {
+    let length = |l: &Vec<HalfEdgeId>| l.iter().map(|h| dual.length(*h)).sum::<f64>();
+    let lengths: Vec<f64> = loops.iter().map(length).collect();
+    let longest = lengths.iter().fold(0.0, |m, l| f64::max(m, *l));
+    let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| arcs(dual, cell_of, l)).collect();
+    let with_outer = |outer: usize| {
+        let mut system = System::new(graph, cells);
+        for (i, arcs) in arcs.iter().enumerate() {
+            if i == outer { system.prescribe(arcs) } else { system.close(arcs, lengths[i] / TAU) }
+        }
+        system.solve().map_or(f64::INFINITY, |places| system.ratio(&places))
+    };
+    let long = (0..loops.len()).filter(|i| lengths[*i] >= LONG * longest);
+    let all = long.map(|outer| (with_outer(outer), outer));
+    all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).unwrap_or((f64::INFINITY, 0))
 }
 
 impl<'a> System<'a> {

@@ -18,8 +18,9 @@ const SHORT: Weights = Weights { ratio: 0.3, roundness: 1.0, spread: 0.5, shared
 const WAYS: [(usize, Weights); 6] =
     [(48, BALANCED), (96, BALANCED), (160, BALANCED), (96, COMPACT), (160, COMPACT), (96, SHORT)];
 
-/// What a decade of the worst area ratio counts, against seams as long as the square root of the area.
-const RATIO: f64 = 0.75;
+/// What seams as long as the square root of the area count, against a decade of the worst area ratio. (They will be a
+/// third shorter when they are straight.)
+const SEAMS: f64 = 0.65;
 
 /// The surface as the search sees it.
 pub(super) struct Search<'a> {
@@ -64,7 +65,7 @@ impl Search<'_> {
     fn fine(&self, mut regions: Regions) -> Vec<bool> {
         let outlines: Vec<_> = (0..regions.all.len() as u32).map(|r| regions.outline_of(r)).collect();
         let judge = |(region, outline): (&Region, &Outline)| {
-            let ratio = || area_ratio(self.dual, &self.cells.of, self.graph, &region.cells, outline);
+            let ratio = || area_ratio(self.dual, &self.cells.of, self.graph, &region.cells, &outline.loops).0;
             self.limits.allow(self.dual, region, outline)
                 && (region.cells.len() == 1 || ratio() <= self.limits.area_ratio)
         };
@@ -94,7 +95,7 @@ impl Search<'_> {
         }
         let score = |(charts, seams, area, worst): (usize, f64, f64, f64)| Score {
             charts,
-            beauty: seams / area.sqrt() + RATIO * worst.log10(),
+            beauty: SEAMS * seams / area.sqrt() + worst.log10(),
         };
         (regions.of_cell, sums.into_iter().map(score).collect())
     }

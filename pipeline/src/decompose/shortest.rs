@@ -46,6 +46,8 @@ pub(super) struct Bounds<'a> {
     pub target: Option<usize>,
     /// Whether paths may end at the open boundary.
     pub to_open: bool,
+    /// Through these vertices.
+    pub band: &'a [bool],
 }
 
 impl Tree {
@@ -122,7 +124,7 @@ impl Bounds<'_> {
     fn admit(&self, network: &Network, h: HalfEdgeId, to: usize) -> bool {
         let inside = |h: HalfEdgeId| self.labels.contains(&network.label(h));
         let free = network.degree(to) == 0 && (self.to_open || !network.is_open(to));
-        (free || self.target == Some(to))
+        (free && self.band[to] || self.target == Some(to))
             && !network.is_seam(h)
             && inside(h)
             && network.dual.across(h).is_some_and(inside)

@@ -8,7 +8,9 @@
 use super::dual::Dual;
 use super::network::{Network, Path};
 use super::shortest::{Bounds, Tree, length, reversed, weight};
+use super::voronoi::At;
 use crate::id::HalfEdgeId;
+use std::collections::BinaryHeap;
 
 /// Rounds over all seams and corners.
 const ROUNDS: usize = 3;
@@ -25,15 +27,19 @@ struct Straightening<'n, 'a> {
     dual: &'a Dual<'a>,
     trees: [Tree; 3],
     reach: f64,
+    /// Per vertex, whether it is near enough to the first seams.
+    band: Vec<bool>,
 }
 
-/// Straightens all seams of `network`.
-pub(super) fn straighten(network: &mut Network) {
+/// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges: shortest
+/// loops would slide off at the end of a tube.
+pub(super) fn straighten(network: &mut Network, breadth: impl Fn(HalfEdgeId) -> f64) {
     let dual = network.dual;
     let tree = || Tree::new(dual.mesh.points().len());
     let area: f64 = (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum();
     let reach = REACH * (area / network.charts().max(1) as f64).sqrt();
-    let mut work = Straightening { network, dual, trees: [tree(), tree(), tree()], reach };
+    let band = band(network, breadth);
+    let mut work = Straightening { network, dual, trees: [tree(), tree(), tree()], reach, band };
     for _ in 0..ROUNDS {
         let before = work.total();
         work.seams();
@@ -70,17 +76,21 @@ impl Straightening<'_, '_> {
         let labels = [left, right];
         let before = length(self.dual, path);
         self.network.lift(path);
-        let bounds = Bounds { labels: &labels, length: (1.0 - GAIN) * before, target: Some(to), to_open: false };
+        let bounds = Bounds {
+            labels: &labels,
+            length: (1.0 - GAIN) * before,
+            target: Some(to),
+            to_open: false,
+            band: &self.band,
+        };
         self.trees[0].grow(self.network, from, &bounds);
         let found = self.trees[0].distance(to).map(|_| self.trees[0].path(self.dual, to));
-        let laid = found.filter(|p| {
-            let path = Path { half_edges: p.clone(), left, right };
-            self.network.lay(&[path], &labels)
-        });
-        if laid.is_none() {
+        let Some(half_edges) = found else {
             self.network.put_back(path);
-        }
-        laid
+            return None;
+        };
+        let laid = self.network.lay(path, &[Path { half_edges: half_edges.clone(), left, right }], &labels);
+        laid.then_some(half_edges)
     }
 
     /// A long seam piece by piece: first half, middle, second half.
@@ -139,24 +149,18 @@ impl Straightening<'_, '_> {
             .filter_map(|h| Some((self.network.label(*h), self.network.label(self.dual.across(*h)?))))
             .collect();
         arms.iter().for_each(|a| self.network.lift(a));
-        let moved = self.meeting(&ends, &labels, before).is_some_and(|ways| {
-            let path = |(half_edges, (left, right)): (&Vec<HalfEdgeId>, &(u32, u32))| Path {
-                half_edges: half_edges.clone(),
-                left: *left,
-                right: *right,
-            };
-            let paths: Vec<Path> = ways.iter().zip(&sides).map(path).collect();
-            self.network.lay(&paths, &labels)
-        });
-        if !moved {
+        let Some(ways) = self.meeting(&ends, &labels, before) else {
             arms.iter().for_each(|a| self.network.put_back(a));
-        }
-        Some(())
+            return None;
+        };
+        let path = |(half_edges, (left, right))| Path { half_edges, left, right };
+        let paths: Vec<Path> = ways.into_iter().zip(sides).map(path).collect();
+        self.network.lay(&arms.concat(), &paths, &labels).then_some(())
     }
 
     /// The ways from the vertex where the sum of the distances to three `ends` is least, if it is less than `before`.
     fn meeting(&mut self, ends: &[usize], labels: &[u32], before: f64) -> Option<Vec<Vec<HalfEdgeId>>> {
-        let bounds = Bounds { labels, length: (1.0 - GAIN) * before, target: None, to_open: false };
+        let bounds = Bounds { labels, length: (1.0 - GAIN) * before, target: None, to_open: false, band: &self.band };
         for (tree, end) in self.trees.iter_mut().zip(ends) {
             tree.grow(self.network, *end, &bounds);
         }
@@ -180,17 +184,43 @@ impl Straightening<'_, '_> {
         let labels = [left, right];
         let before = length(self.dual, &arm);
         self.network.lift(&arm);
-        let bounds = Bounds { labels: &labels, length: (1.0 - GAIN) * before, target: None, to_open: true };
+        let bounds =
+            Bounds { labels: &labels, length: (1.0 - GAIN) * before, target: None, to_open: true, band: &self.band };
         let tree = &mut self.trees[0];
         tree.grow(self.network, root, &bounds);
-        let open = tree.reached.iter().copied().find(|v| *v != root && self.network.is_open(*v));
-        let moved = open.is_some_and(|v| {
-            let half_edges = reversed(self.dual, &tree.path(self.dual, v));
-            self.network.lay(&[Path { half_edges, left, right }], &labels)
-        });
-        if !moved {
+        let open = tree.reached.iter().copied().find(|v| *v != root && self.network.on_one_loop(*v, end));
+        let Some(vertex) = open else {
             self.network.put_back(&arm);
-        }
-        Some(())
+            return None;
+        };
+        let half_edges = reversed(self.dual, &tree.path(self.dual, vertex));
+        self.network.lay(&arm, &[Path { half_edges, left, right }], &labels).then_some(())
     }
+}
+
+/// The vertices no farther from a seam than `breadth` at one of its half-edges. Dijkstra by what is left of it.
+fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Vec<bool> {
+    let dual = network.dual;
+    let mut left = vec![0.0_f64; dual.mesh.points().len()];
+    let mut heap = BinaryHeap::new();
+    for h in dual.half_edges().filter(|h| network.is_seam(*h)) {
+        let breadth = breadth(h);
+        if breadth > left[dual.from(h)] {
+            left[dual.from(h)] = breadth;
+            heap.push(At { distance: -breadth, node: dual.from(h) as u32 });
+        }
+    }
+    while let Some(At { distance, node }) = heap.pop() {
+        if -distance < left[node as usize] {
+            continue;
+        }
+        network.each_out(node as usize, |h| {
+            let rest = -distance - dual.length(h);
+            if rest > left[dual.to(h)] {
+                left[dual.to(h)] = rest;
+                heap.push(At { distance: -rest, node: dual.to(h) as u32 });
+            }
+        });
+    }
+    left.into_iter().map(|l| l > 0.0).collect()
 }
