@@ -8,10 +8,10 @@
 
 mod assemble;
 mod dual;
+mod judge;
 mod legality;
 mod merge;
 mod network;
-mod outer;
 mod predict;
 mod regions;
 mod search;
@@ -23,10 +23,10 @@ use crate::atlas::Atlas;
 use crate::mesh::{Census, SurfaceMesh};
 pub use assemble::assemble;
 use dual::Dual;
+use judge::{Verdict, choose_outer, judge};
 pub use legality::Illegal;
 use merge::Limits;
 use network::Network;
-use outer::choose_outer;
 use predict::CellGraph;
 use regions::Regions;
 use search::Search;
@@ -86,10 +86,20 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
     let graph = CellGraph::new(&dual, &cells);
     let charts = Search { dual: &dual, cells: &cells, graph: &graph, limits }.run();
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
-    let mut network = Network::new(&dual, labels.clone(), limits);
-    straighten(&mut network, |h| BAND * graph.area(cells.of[h.face().index()]).sqrt());
-    let mut atlas = assemble(mesh, if network.is_sound() { &network.labels } else { &labels })?;
-    choose_outer(&mut atlas, &dual, &cells);
+    let mut network = Network::new(&dual, labels, limits);
+    let mut verdicts = judge(&mut network, &cells);
+    for band in BANDS {
+        let mut straight = Network::new(&dual, network.labels.clone(), limits);
+        straighten(&mut straight, |h| band * graph.area(cells.of[h.face().index()]).sqrt());
+        let found = judge(&mut straight, &cells);
+        let fits = |v: &Option<Verdict>| v.is_none_or(|v| v.ratio <= settings.max_area_ratio);
+        if !straight.is_sound() || !found.iter().all(fits) {
+            break;
+        }
+        (network, verdicts) = (straight, found);
+    }
+    let mut atlas = assemble(mesh, &network.labels)?;
+    choose_outer(&mut atlas, &verdicts);
     Ok(atlas)
 }
 
@@ -108,8 +118,9 @@ fn cells(dual: &Dual, limits: &Limits) -> Cells {
 /// seams change it.
 const MARGIN: f64 = 0.85;
 
-/// How far seams may be straightened, in sizes of a cell.
-const BAND: f64 = 2.5;
+/// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
+/// seams along a tube come together. So the area ratio is foretold again after every step, and the last good one kept.
+const BANDS: [f64; 3] = [1.0, 1.5, 2.0];
 
 /// Cells per component, at most.
 const CELLS: usize = 800;

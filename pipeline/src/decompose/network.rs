@@ -213,6 +213,17 @@ impl<'a> Network<'a> {
         self.sizes.iter().filter(|s| **s > 0).count()
     }
 
+    /// One more than the highest label.
+    pub(super) fn label_count(&self) -> usize {
+        self.sizes.len()
+    }
+
+    /// The boundary loops of a chart.
+    pub(super) fn loops(&mut self, label: u32) -> Vec<Vec<HalfEdgeId>> {
+        let boundary = self.boundaries[label as usize].clone();
+        self.outline(label, &boundary).loops
+    }
+
     /// All seams: those between corners, then the closed ones.
     pub(super) fn curves(&self) -> Vec<Vec<HalfEdgeId>> {
         let mut seen = vec![false; self.dual.mesh.edges().len()];
@@ -250,21 +261,18 @@ impl<'a> Network<'a> {
         self.put_back(&added);
         let mut changed = Vec::new();
         let fits = self.flood(paths, labels, &mut changed)
+            && labels.iter().all(|l| self.areas[*l as usize] >= self.least[*l as usize])
             && {
-                let enough = labels.iter().all(|l| self.areas[*l as usize] >= self.least[*l as usize]);
-                enough
-            }
-            && {
-                self.renew_boundaries(labels, &added);
+                self.renew_boundaries(labels, &added, &changed);
                 labels.iter().all(|l| self.is_legal(*l))
             };
         if !fits {
-            for (face, label) in changed.into_iter().rev() {
-                self.relabel(face, label);
+            for (face, label) in changed.iter().rev() {
+                self.relabel(*face, *label);
             }
             self.lift(&added);
             self.put_back(lifted);
-            self.renew_boundaries(labels, lifted);
+            self.renew_boundaries(labels, lifted, &changed);
         }
         fits
     }
@@ -344,11 +352,13 @@ impl<'a> Network<'a> {
     }
 
     /// Brings the boundaries of charts up to date: what is none any more goes, what was laid comes.
-    fn renew_boundaries(&mut self, labels: &[u32], laid: &[HalfEdgeId]) {
+    fn renew_boundaries(&mut self, labels: &[u32], laid: &[HalfEdgeId], changed: &[(FaceId, u32)]) {
         for label in labels {
             let mut boundary = std::mem::take(&mut self.boundaries[*label as usize]);
             boundary.retain(|h| self.bounds(*h, *label));
-            let sides = laid.iter().flat_map(|h| [Some(*h), self.dual.across(*h)]).flatten();
+            let around = |(face, _): &(FaceId, u32)| [0, 1, 2].map(|k| HalfEdgeId::side_of(*face, k));
+            let near = laid.iter().copied().chain(changed.iter().flat_map(around));
+            let sides = near.flat_map(|h| [Some(h), self.dual.across(h)]).flatten();
             boundary.extend(sides.filter(|h| self.bounds(*h, *label)));
             boundary.sort_unstable();
             boundary.dedup();

@@ -12,8 +12,12 @@ use super::voronoi::At;
 use crate::id::HalfEdgeId;
 use std::collections::BinaryHeap;
 
-/// Rounds over all seams and corners.
-const ROUNDS: usize = 3;
+/// Rounds over all seams and corners, and the share of the length that makes another one worth while.
+const ROUNDS: usize = 2;
+const LEAST_GAIN: f64 = 1e-3;
+
+/// Pieces of fewer edges are not looked at.
+const FEW: usize = 4;
 
 /// A change must be shorter by this share.
 const GAIN: f64 = 1e-6;
@@ -31,8 +35,7 @@ struct Straightening<'n, 'a> {
     band: Vec<bool>,
 }
 
-/// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges: shortest
-/// loops would slide off at the end of a tube.
+/// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges.
 pub(super) fn straighten(network: &mut Network, breadth: impl Fn(HalfEdgeId) -> f64) {
     let dual = network.dual;
     let tree = || Tree::new(dual.mesh.points().len());
@@ -44,7 +47,7 @@ pub(super) fn straighten(network: &mut Network, breadth: impl Fn(HalfEdgeId) -> 
         let before = work.total();
         work.seams();
         work.corners();
-        if work.total() > (1.0 - 1e-3) * before {
+        if work.total() > (1.0 - LEAST_GAIN) * before {
             return;
         }
     }
@@ -60,18 +63,35 @@ impl Straightening<'_, '_> {
     fn seams(&mut self) {
         for path in self.network.curves() {
             let closed = self.dual.from(path[0]) == self.dual.to(path[path.len() - 1]);
-            if closed {
-                self.shorten_loop(path);
-            } else if self.shorten(&path).is_none() {
-                self.shorten_pieces(path);
-            }
+            if closed { self.shorten_loop(path) } else { self.shorten_all(path) }
         }
     }
 
-    /// The shortest path in the place of a seam (or a part of one); none where that is not shorter, or not legal.
-    fn shorten(&mut self, path: &[HalfEdgeId]) -> Option<Vec<HalfEdgeId>> {
-        let (first, last) = (*path.first()?, *path.last()?);
-        let (left, right) = (self.network.label(first), self.network.label(self.dual.across(first)?));
+    /// A seam as a whole; where that fails, by overlapping pieces, then by pieces half as long, down to a few edges.
+    fn shorten_all(&mut self, mut path: Vec<HalfEdgeId>) {
+        let mut pieces = 1;
+        while path.len() / pieces >= FEW {
+            let mut done = true;
+            for half in 0..2 * pieces - 1 {
+                let n = path.len();
+                let range = half * n / (2 * pieces)..(half + 2) * n / (2 * pieces);
+                match self.shorten(&path[range.clone()].to_vec()) {
+                    Ok(piece) => drop(path.splice(range, piece)),
+                    Err(straight) => done &= straight,
+                }
+            }
+            if done {
+                return;
+            }
+            pieces *= 2;
+        }
+    }
+
+    /// The shortest path in the place of a seam (or a part of one); else whether there was none that is shorter.
+    fn shorten(&mut self, path: &[HalfEdgeId]) -> Result<Vec<HalfEdgeId>, bool> {
+        let (Some(first), Some(last)) = (path.first().copied(), path.last().copied()) else { return Err(true) };
+        let Some(beyond) = self.dual.across(first) else { return Err(true) };
+        let (left, right) = (self.network.label(first), self.network.label(beyond));
         let (from, to) = (self.dual.from(first), self.dual.to(last));
         let labels = [left, right];
         let before = length(self.dual, path);
@@ -87,24 +107,10 @@ impl Straightening<'_, '_> {
         let found = self.trees[0].distance(to).map(|_| self.trees[0].path(self.dual, to));
         let Some(half_edges) = found else {
             self.network.put_back(path);
-            return None;
+            return Err(true);
         };
         let laid = self.network.lay(path, &[Path { half_edges: half_edges.clone(), left, right }], &labels);
-        laid.then_some(half_edges)
-    }
-
-    /// A long seam piece by piece: first half, middle, second half.
-    fn shorten_pieces(&mut self, mut path: Vec<HalfEdgeId>) {
-        for quarter in [0, 1, 2] {
-            let n = path.len();
-            let range = quarter * n / 4..(quarter + 2) * n / 4;
-            if range.len() < 2 {
-                continue;
-            }
-            if let Some(piece) = self.shorten(&path[range.clone()].to_vec()) {
-                path.splice(range, piece);
-            }
-        }
+        if laid { Ok(half_edges) } else { Err(false) }
     }
 
     /// A closed seam: its thirds, then thirds that begin in the middle of these.
@@ -114,7 +120,7 @@ impl Straightening<'_, '_> {
             if third < 2 {
                 return;
             }
-            if let Some(piece) = self.shorten(&path[..third].to_vec()) {
+            if let Ok(piece) = self.shorten(&path[..third].to_vec()) {
                 path.splice(..third, piece);
             }
             let step = if turn % 3 == 2 { third / 2 } else { third };
