@@ -3,7 +3,7 @@
 use super::voronoi::Graph;
 use crate::id::{FaceId, HalfEdgeId};
 use crate::mesh::SurfaceMesh;
-use crate::space::{Vec3, cross, distance, midpoint, norm, sub};
+use crate::space::{Vec3, cross, distance, midpoint, sub};
 
 const NONE: HalfEdgeId = HalfEdgeId(u32::MAX);
 
@@ -17,6 +17,9 @@ pub(super) struct Dual<'a> {
     points: Vec<Vec3>,
     centroids: Vec<Vec3>,
     areas: Vec<f64>,
+    /// Per half-edge its true length, and the distance of the centroids at its sides by way of its middle.
+    lengths: Vec<f64>,
+    steps: Vec<f64>,
 }
 
 impl<'a> Dual<'a> {
@@ -30,14 +33,26 @@ impl<'a> Dual<'a> {
             let [a, b, c] = t.map(|v| points[v.index()]);
             [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
         };
-        Self {
+        let mut made = Self {
             across: (0..3 * triangles.len()).map(|h| across(HalfEdgeId::at(h))).collect(),
             feature: vec![false; mesh.edges().len()],
             centroids: triangles.iter().map(centroid).collect(),
             areas: mesh.metric().shapes.iter().map(|s| s.area()).collect(),
+            lengths: Vec::new(),
+            steps: Vec::new(),
             mesh,
             points,
-        }
+        };
+        made.lengths =
+            made.half_edges().map(|h| distance(made.points[made.from(h)], made.points[made.to(h)])).collect();
+        made.steps = made.half_edges().map(|h| made.step(h)).collect();
+        made
+    }
+
+    fn step(&self, h: HalfEdgeId) -> f64 {
+        let m = self.middle(h);
+        let reach = |f: FaceId| distance(self.centroids[f.index()], m);
+        reach(h.face()) + self.across(h).map_or(0.0, |t| reach(t.face()))
     }
 
     /// The half-edge on the other side, running the other way; none at the boundary, and where the triangles
@@ -82,7 +97,7 @@ impl<'a> Dual<'a> {
 
     /// The true length of the edge along `h`.
     pub(super) fn length(&self, h: HalfEdgeId) -> f64 {
-        distance(self.points[self.from(h)], self.points[self.to(h)])
+        self.lengths[h.index()]
     }
 
     /// The middle of the edge along `h`.
@@ -104,9 +119,7 @@ impl Graph for Dual<'_> {
     fn each_neighbour(&self, face: usize, mut visit: impl FnMut(usize, f64)) {
         for h in (0..3).map(|k| HalfEdgeId::side_of(FaceId::at(face), k)) {
             let Some(other) = self.across(h).filter(|_| !self.is_feature(h)) else { continue };
-            let g = other.face().index();
-            let m = self.middle(h);
-            visit(g, norm(sub(self.centroids[face], m)) + norm(sub(self.centroids[g], m)));
+            visit(other.face().index(), self.steps[h.index()]);
         }
     }
 }

@@ -307,8 +307,14 @@ impl<'a> Network<'a> {
         while let Some(face) = stack.pop() {
             let label = self.labels[face.index()];
             for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
-                let beyond = self.dual.across(h).filter(|t| !self.is_seam(h) && self.label(*t) != label);
-                let Some(t) = beyond else { continue };
+                let Some(t) = self.dual.across(h) else { continue };
+                if self.is_seam(h) == (self.label(t) != label) {
+                    continue;
+                }
+                if self.is_seam(h) {
+                    // The chart would reach both sides of another seam.
+                    return false;
+                }
                 if !self.claim(t.face(), label, labels, changed, &mut stack) {
                     return false;
                 }
