@@ -4,8 +4,11 @@ use crate::atlas::Chart;
 use crate::boundary::{Boundary, Mids};
 use crate::certify::{self, CertifiedMap, PlanarMap, prove};
 use crate::closed::ClosedChart;
+use crate::decompose;
+use crate::distortion;
 use crate::grid::GridPoint;
 use crate::linear::{self, LinearMap, linear_map, lower_ears};
+use crate::mesh::SurfaceMesh;
 use crate::quadratic::{QuadraticMap, least_det, quadratic_map};
 use crate::sparse;
 use crate::untangle::{self, Untangled, untangle};
@@ -40,6 +43,14 @@ pub enum MapError {
     /// The raised linear map is not one-to-one in double precision.
     #[error("the chart is too distorted for one map: {0}; it must be split")]
     Start(certify::Error),
+    /// The map stretches too much.
+    #[error("the area ratio {ratio:.2e} of the chart is above the largest one allowed; it must be split")]
+    Stretched {
+        /// The area ratio.
+        ratio: f64,
+        /// Per triangle, the logarithm of the area scale around it.
+        log_scales: Vec<f64>,
+    },
 }
 
 /// A chart with its certified map and the account of how it was found.
@@ -72,6 +83,14 @@ pub struct Harmonic {
 /// # Errors
 /// [`MapError`]: the chart must be split.
 pub fn map_chart(chart: &Chart, order: Order) -> Result<MappedChart, MapError> {
+    map_within(chart, order, f64::INFINITY)
+}
+
+/// As [`map_chart`], where the linear map's area ratio may not exceed `max_area_ratio`.
+///
+/// # Errors
+/// [`MapError`]: the chart must be split.
+pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64) -> Result<MappedChart, MapError> {
     let closed = ClosedChart::new(chart);
     let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
     let mut boundary = Boundary::circle(&closed, mids);
@@ -80,8 +99,59 @@ pub fn map_chart(chart: &Chart, order: Order) -> Result<MappedChart, MapError> {
     let start = linear.raised(&closed, &boundary);
     let centres = (0..closed.loops().len()).map(|k| start[closed.centre_node(k)]).collect();
     let certified_start = prove(planar(&closed, &start, centres)).map_err(MapError::Start)?;
+    if max_area_ratio.is_finite() {
+        let ratio = distortion::area_ratio(chart, &certified_start);
+        if ratio > max_area_ratio {
+            return Err(MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) });
+        }
+    }
     let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary));
     Ok(MappedChart { closed, linear, start, certified_start, harmonic })
+}
+
+/// The linear map may reach this share of the largest area ratio: the quadratic one differs a little.
+const MARGIN: f64 = 0.8;
+
+/// Maps `chart`, a part of `mesh`, and splits it where it cannot be mapped, or is more distorted than `settings` allow,
+/// until every part can. Ends because parts are smaller, and single triangles map.
+///
+/// # Errors
+/// [`SplitError`].
+pub fn map_or_split(
+    mesh: &SurfaceMesh,
+    chart: Chart,
+    order: Order,
+    settings: &decompose::Settings,
+) -> Result<Vec<(Chart, MappedChart)>, SplitError> {
+    let mut mapped = Vec::new();
+    let mut waiting = vec![chart];
+    while let Some(chart) = waiting.pop() {
+        let error = match map_within(&chart, order, MARGIN * settings.max_area_ratio) {
+            Ok(map) => {
+                mapped.push((chart, map));
+                continue;
+            }
+            Err(error) => error,
+        };
+        let scales = if let MapError::Stretched { log_scales, .. } = &error { Some(&log_scales[..]) } else { None };
+        match decompose::split(mesh, &chart, scales, settings)? {
+            Some(parts) => waiting.extend(parts.into_iter().rev()),
+            // A single triangle: its map is what it is.
+            None => mapped.push((chart.clone(), map_chart(&chart, order)?)),
+        }
+    }
+    Ok(mapped)
+}
+
+/// Why a chart has no map, split or not.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SplitError {
+    /// A single triangle does not map.
+    #[error(transparent)]
+    Map(#[from] MapError),
+    /// A part is no chart: a fault of planish.
+    #[error(transparent)]
+    Split(#[from] decompose::Error),
 }
 
 /// Untangles the harmonic map of a chart and certifies the result; where that cannot be proven, the result is the

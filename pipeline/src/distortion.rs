@@ -95,10 +95,8 @@ pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summ
     let counted = |f: &usize| all_flagged || !chart.flagged()[*f];
     let weighted = |f: usize| (fields[f].conformal_distortion, chart.shapes()[f].area());
     let mut conformal: Vec<_> = (0..fields.len()).filter(counted).map(weighted).collect();
-    let mut scales = star_scales(chart, map);
     let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
-    let [low, high] = quantiles(&mut scales, [0.001, 0.999]);
-    Summary { conformal_median, conformal_p99, area_ratio: finite(high / low) }
+    Summary { conformal_median, conformal_p99, area_ratio: area_ratio(chart, map) }
 }
 
 /// Per vertex, the area scale of its star of two rings, with the area of its own star as weight.
@@ -118,6 +116,18 @@ fn star_scales(chart: &Chart, map: &CertifiedMap) -> Vec<(f64, f64)> {
         (sum(&plane) / sum(&space), weight)
     };
     (0..chart.vertices().len()).map(two_rings).collect()
+}
+
+/// Per triangle, the logarithm of the area scale around it: the mean over its corners, each with its two rings.
+pub(crate) fn log_scales(chart: &Chart, map: &CertifiedMap) -> Vec<f64> {
+    let logs: Vec<f64> = star_scales(chart, map).into_iter().map(|(scale, _)| finite(scale).ln()).collect();
+    chart.triangles().iter().map(|t| t.iter().map(|v| logs[v.index()]).sum::<f64>() / 3.0).collect()
+}
+
+/// The area ratio of a chart (see [`Summary::area_ratio`]).
+pub fn area_ratio(chart: &Chart, map: &CertifiedMap) -> f64 {
+    let [low, high] = quantiles(&mut star_scales(chart, map), [0.001, 0.999]);
+    finite(high / low)
 }
 
 /// The values at the given shares of the total weight.

@@ -67,6 +67,9 @@ pub mod quadratic;
 pub mod repair;
 pub mod untangle;
 
-pub use chart_map::{CertifiedChart, Harmonic, MapError, MappedChart, Order, finish_chart, map_chart};
+pub use chart_map::{
+    CertifiedChart, Harmonic, MapError, MappedChart, Order, SplitError, finish_chart, map_chart, map_or_split,
+    map_within,
+};
 pub use decompose::decompose;
 pub use repair::repair;

@@ -16,10 +16,12 @@ mod predict;
 mod regions;
 mod search;
 mod shortest;
+mod split;
 mod straighten;
 mod voronoi;
 
 use crate::atlas::Atlas;
+use crate::id::HalfEdgeId;
 use crate::mesh::{Census, SurfaceMesh};
 pub use assemble::assemble;
 use dual::Dual;
@@ -30,6 +32,7 @@ use network::Network;
 use predict::CellGraph;
 use regions::Regions;
 use search::Search;
+pub use split::split;
 use straighten::straighten;
 use voronoi::{Cells, bisect_until, farthest_first};
 
@@ -77,30 +80,49 @@ impl Default for Settings {
 /// [`Error`].
 pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error> {
     let dual = Dual::new(mesh);
-    let limits = Limits {
-        area_ratio: settings.max_area_ratio.powf(MARGIN),
-        triangles: settings.max_triangles,
-        strict_disks: settings.strict_disks,
-    };
+    let limits = Limits::new(settings);
     let cells = cells(&dual, &limits);
     let graph = CellGraph::new(&dual, &cells);
     let charts = Search { dual: &dual, cells: &cells, graph: &graph, limits }.run();
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
-    let mut network = Network::new(&dual, labels, limits);
-    let mut verdicts = judge(&mut network, &cells);
+    finish(&dual, labels, limits, settings, &cells, |h| graph.area(cells.of[h.face().index()]).sqrt())
+}
+
+/// Straightens the seams between labels and makes the charts. `size` tells that of a cell.
+fn finish(
+    dual: &Dual,
+    labels: Vec<u32>,
+    limits: Limits,
+    settings: &Settings,
+    cells: &Cells,
+    size: impl Fn(HalfEdgeId) -> f64,
+) -> Result<Atlas, Error> {
+    let mut network = Network::new(dual, labels, limits);
+    let mut verdicts = judge(&mut network, cells);
     for band in BANDS {
-        let mut straight = Network::new(&dual, network.labels.clone(), limits);
-        straighten(&mut straight, |h| band * graph.area(cells.of[h.face().index()]).sqrt());
-        let found = judge(&mut straight, &cells);
-        let fits = |v: &Option<Verdict>| v.is_none_or(|v| v.ratio <= settings.max_area_ratio);
-        if !straight.is_sound() || !found.iter().all(fits) {
+        let mut straight = Network::new(dual, network.labels.clone(), limits);
+        straighten(&mut straight, |h| band * size(h));
+        let found = judge(&mut straight, cells);
+        let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
+        let worse = |(new, old)| ratio(new) > settings.max_area_ratio.max(ratio(old));
+        if !straight.is_sound() || found.iter().zip(&verdicts).any(worse) {
             break;
         }
         (network, verdicts) = (straight, found);
     }
-    let mut atlas = assemble(mesh, &network.labels)?;
+    let mut atlas = assemble(dual.mesh, &network.labels)?;
     choose_outer(&mut atlas, &verdicts);
     Ok(atlas)
+}
+
+impl Limits {
+    fn new(settings: &Settings) -> Self {
+        Self {
+            area_ratio: settings.max_area_ratio.powf(MARGIN),
+            triangles: settings.max_triangles,
+            strict_disks: settings.strict_disks,
+        }
+    }
 }
 
 /// Legal cells of about the same size.

@@ -1,6 +1,7 @@
 //! A repaired surface.
 
 use super::{Census, EdgeTable, Metric};
+use crate::atlas::Chart;
 use crate::id::VertexId;
 use crate::space::{BoundingBox, Vec3, triangle_area};
 
@@ -59,6 +60,27 @@ impl SurfaceMesh {
     /// The corners of a triangle in space.
     pub fn corners(&self, face: usize) -> [Vec3; 3] {
         self.triangles[face].map(|v| self.points[v.index()])
+    }
+
+    /// The part of the surface that a chart covers, as a surface of its own: vertices and triangles are numbered as in
+    /// the chart.
+    pub(crate) fn part(&self, chart: &Chart) -> Self {
+        let vertex = |v: &VertexId| v.index();
+        let (triangles, edges) = (chart.triangles().to_vec(), chart.edges().clone());
+        Self {
+            points: chart.vertices().iter().map(|v| self.points[vertex(v)]).collect(),
+            welded: chart.vertices().iter().map(|v| self.welded[vertex(v)]).collect(),
+            source: chart.faces().iter().map(|f| self.source[f.index()]).collect(),
+            census: Census::new(&triangles, &edges),
+            metric: Metric {
+                shapes: chart.shapes().to_vec(),
+                flagged: chart.flagged().to_vec(),
+                mollified_by: self.metric.mollified_by,
+                scale: self.metric.scale,
+            },
+            triangles,
+            edges,
+        }
     }
 
     /// The total true area, in the unit of the input, squared.
