@@ -65,6 +65,7 @@ pub mod distortion;
 pub mod linear;
 pub mod quadratic;
 pub mod repair;
+pub mod seams;
 pub mod untangle;
 
 pub use chart_map::{CertifiedChart, Harmonic, MapError, MappedChart, Order, finish_chart, map_chart};
