@@ -346,4 +346,4 @@ impl<'a> Tracer<'a> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

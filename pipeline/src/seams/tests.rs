@@ -147,29 +147,30 @@ fn a_cut_disk_has_corners_where_the_seam_meets_the_boundary() {
     assert_eq!((network.curves().len(), network.seams().count(), corners(&network)), (3, 1, 2));
 }
 
-#[test]
-fn a_chart_along_itself_is_seen_on_both_sides() {
-    // A cylinder cut open: its chart is a rectangle whose two ends lie on each other.
+/// A cylinder with a fin along one ruling, where repair cuts it open: its chart is a rectangle whose ends lie on each
+/// other.
+pub(crate) fn cut_cylinder() -> TriangleSoup {
     let n = 8;
     let point = |i: u32, j: u32| {
         let angle = std::f64::consts::TAU * f64::from(i) / f64::from(n);
         [angle.cos(), angle.sin(), f64::from(j)]
     };
-    let points = (0..n).flat_map(|i| (0..3).map(move |j| point(i, j))).collect();
-    let at = |i: u32, j: u32| 3 * (i % n) + j;
-    let quads = (0..n).flat_map(|i| (0..2).map(move |j| (i, j)));
-    // A third sheet at one ruling makes it non-manifold, so that repair splits the cylinder there.
-    let mut triangles: Vec<_> = quads
-        .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]])
-        .collect();
-    let mut points: Vec<Vec3> = points;
+    let mut points: Vec<Vec3> = (0..n).flat_map(|i| (0..3).map(move |j| point(i, j))).collect();
     points.extend([[2.0, 0.0, 0.0], [2.0, 0.0, 1.0], [2.0, 0.0, 2.0]]);
-    let fin = 3 * n;
+    let (at, fin) = (|i: u32, j: u32| 3 * (i % n) + j, 3 * n);
+    let mut triangles = Vec::new();
+    for (i, j) in (0..n).flat_map(|i| (0..2).map(move |j| (i, j))) {
+        triangles.extend([[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]);
+    }
     for j in 0..2 {
         triangles.extend([[at(0, j), fin + j, fin + j + 1], [at(0, j), fin + j + 1, at(0, j + 1)]]);
     }
-    let soup = TriangleSoup::new(points, triangles).expect("sound");
-    let (mesh, atlas) = labelled(&soup, |p| u32::from(p[0].hypot(p[1]) > 1.0));
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn a_chart_along_itself_is_seen_on_both_sides() {
+    let (mesh, atlas) = labelled(&cut_cylinder(), |p| u32::from(p[0].hypot(p[1]) > 1.0));
     let network = verify(&mesh, &atlas);
     let along: Vec<_> = network.seams().collect();
     assert_eq!(along.len(), 2, "no chain runs on where a chart passes twice");
