@@ -9,6 +9,8 @@
 //! Curves are numbered in the order in which the loops of the charts first meet them, and run as the first of these
 //! charts does. The cost is that of sorting the segments.
 
+mod distance;
+
 use crate::atlas::Chart;
 use crate::id::{ChartId, CurveId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;

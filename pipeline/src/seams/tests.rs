@@ -6,7 +6,7 @@ use crate::space::Vec3;
 use crate::{repair, shapes};
 
 /// The atlas of a soup in which each triangle is labelled by its centre.
-fn labelled(soup: &TriangleSoup, label: impl Fn(Vec3) -> u32) -> (SurfaceMesh, Atlas) {
+pub(crate) fn labelled(soup: &TriangleSoup, label: impl Fn(Vec3) -> u32) -> (SurfaceMesh, Atlas) {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
     let centre = |f: usize| {
         let [a, b, c] = mesh.corners(f);
@@ -17,7 +17,7 @@ fn labelled(soup: &TriangleSoup, label: impl Fn(Vec3) -> u32) -> (SurfaceMesh, A
     (mesh, atlas)
 }
 
-fn sector(p: Vec3, count: u32) -> u32 {
+pub(crate) fn sector(p: Vec3, count: u32) -> u32 {
     let turns = (p[1].atan2(p[0]) / std::f64::consts::TAU).rem_euclid(1.0);
     (turns * f64::from(count)) as u32
 }

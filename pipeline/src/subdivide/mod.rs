@@ -2,13 +2,13 @@
 //!
 //! Every curved triangle becomes four straight ones between its six nodes; in space, mid-edge nodes lie in the
 //! middle of straight edges. A curved triangle can be valid although one of the four is not: there it is refined
-//! ([`refine`]) until all are positive, decided exactly on the numbers that are kept. Where that would take too many
+//! until all are positive, decided exactly on the numbers that are kept. Where that would take too many
 //! parts (a curved triangle may be valid by a hair along a whole side) the chart is handed over by the map from which
 //! its untangling started: it is certified too, and its triangles are straight. Nodes on seams are the same numbers in
 //! all charts, and a curve is exactly the sides of the triangles along it: nothing cracks or overlaps.
 //!
 //! Meshers compute normals from the numbers as written and fail where one is exactly zero: in this copy, and only
-//! here, such a triangle has one node moved by 1e-12 of the bounding box ([`normals`]).
+//! here, such a triangle has one node moved by 1e-12 of the bounding box.
 //!
 //! A [`LinearAtlas`] can only be made from certified maps.
 

@@ -1,10 +1,10 @@
 use super::*;
 use crate::atlas::Atlas;
 use crate::certify::{PlanarMap, prove};
-use crate::decompose::assemble;
 use crate::mesh::TriangleSoup;
+use crate::seams::tests::{labelled, sector};
 use crate::space::distance;
-use crate::{Order, finish_chart, map_chart, repair, shapes};
+use crate::{Order, finish_chart, map_chart, shapes};
 
 /// A surface with one chart per label, and their maps.
 struct Sample {
@@ -16,13 +16,7 @@ struct Sample {
 
 impl Sample {
     fn new(soup: &TriangleSoup, label: impl Fn(Vec3) -> u32) -> Self {
-        let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-        let centre = |f: usize| {
-            let [a, b, c] = mesh.corners(f);
-            [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
-        };
-        let labels: Vec<u32> = (0..mesh.triangles().len()).map(|f| label(centre(f))).collect();
-        let atlas = assemble(&mesh, &labels).expect("legal");
+        let (mesh, atlas) = labelled(soup, label);
         let certified = |c| finish_chart(map_chart(c, Order::Quadratic).expect("maps"));
         let maps = atlas.charts().iter().map(certified).collect();
         let network = SeamNetwork::new(&mesh, atlas.charts());
@@ -74,11 +68,6 @@ impl Sample {
             assert!((length / curve.length() - 1.0).abs() < 1e-9, "nodes lie in order along the curve");
         }
     }
-}
-
-fn sector(p: Vec3, count: u32) -> u32 {
-    let turns = (p[1].atan2(p[0]) / std::f64::consts::TAU).rem_euclid(1.0);
-    (turns * f64::from(count)) as u32
 }
 
 #[test]
