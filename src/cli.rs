@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::settings::{Log, Said, Settings, SettingsError};
+use crate::settings::{HandOff, Log, Said, Settings, SettingsError};
 use clap::{ArgAction, Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -39,6 +39,13 @@ pub struct Run {
     /// Order of the elements: 1 (linear) or 2 (quadratic) [default: 2]
     #[arg(long, value_name = "1|2")]
     pub order: Option<u8>,
+    /// Meshers to which results are handed: gmsh writes atlas.msh and remesh.geo [default: gmsh]
+    #[arg(long, value_enum, value_name = "MESHER")]
+    pub hand_off: Option<HandOff>,
+    /// Edge length of the mesh to be made, in the unit of the input [default: that of as many equilateral triangles
+    /// of the same area, but at most 1/50 of the bounding box's diagonal]
+    #[arg(long, value_name = "H")]
+    pub size: Option<f64>,
     /// Process inputs whose output is up to date, too
     #[arg(long)]
     pub force: bool,
@@ -115,6 +122,8 @@ impl Verb {
                     out: run.out.clone(),
                     order: run.order,
                     weld: run.reading.weld,
+                    hand_off: run.hand_off,
+                    size: run.size,
                     force: run.force.then_some(true),
                     ..Said::default()
                 };

@@ -1,13 +1,16 @@
 //! One input as it travels: from its file to its published result.
 
-use crate::formats::{self, Kind, vtu};
+use crate::formats::{self, Kind, vtm, vtp, vtu};
+use crate::hand_off;
 use crate::outcome::{Code, Reason, Status};
 use crate::publish::{PublishError, Publisher};
 use crate::report::{self, Input, Output, Report};
-use crate::settings::Settings;
+use crate::settings::{self, Settings};
+use pipeline::atlas::Atlas;
 use pipeline::distortion::{self, CellFields};
 use pipeline::mesh::TriangleSoup;
 use pipeline::repair::Repaired;
+use pipeline::seams::SeamNetwork;
 use pipeline::{CertifiedChart, MapError, decompose, finish_chart, map_chart, repair};
 use rustix::time::{ClockId, clock_gettime};
 use std::ffi::OsString;
@@ -254,22 +257,57 @@ fn stages(
     report.surface = Some(report::surface(&found));
     report.repairs = Some(report::repairs(&found.report));
     let atlas = decompose(&found.mesh).map_err(|e| Reason::new(Code::NeedsDecomposition, e))?;
+    map_and_write(&found, &atlas, settings, report, clock)
+}
+
+/// Maps the charts of an atlas, however it was made; returns the files of its result and completes the report.
+///
+/// # Errors
+/// The refusal, where a chart cannot be mapped.
+pub fn finish(
+    found: &Repaired,
+    atlas: &Atlas,
+    settings: &Settings,
+    report: &mut Report,
+) -> Result<Vec<(String, Vec<u8>)>, Reason> {
+    report.surface = Some(report::surface(found));
+    report.repairs = Some(report::repairs(&found.report));
+    let files = map_and_write(found, atlas, settings, report, &mut Clock::new(&|_| ()))?;
+    report.outputs = files.iter().map(|(name, content)| Output::of(name, content)).collect();
+    Ok(files)
+}
+
+fn map_and_write(
+    found: &Repaired,
+    atlas: &Atlas,
+    settings: &Settings,
+    report: &mut Report,
+    clock: &mut Clock,
+) -> Result<Vec<(String, Vec<u8>)>, Reason> {
     let mut done = Vec::new();
     for chart in atlas.charts() {
         clock.next(report, Stage::Map);
-        let mapped = map_chart(chart, settings.order).map_err(|e| map_refusal(&e, &found, chart))?;
+        let mapped = map_chart(chart, settings.order).map_err(|e| map_refusal(&e, found, chart))?;
         clock.next(report, Stage::Untangle);
         done.push(finish_chart(mapped));
     }
     clock.next(report, Stage::Write);
+    let network = SeamNetwork::new(&found.mesh, atlas.charts());
     let fields: Vec<_> = atlas.charts().iter().zip(&done).map(|(c, d)| distortion::fields(c, &d.certified)).collect();
     for ((chart, done), fields) in atlas.charts().iter().zip(&done).zip(&fields) {
         warn_if_unsolved(chart, done);
         let summary = distortion::summary(chart, &done.certified, fields);
-        report.charts.push(report::chart_report(chart, done, fields, &summary));
+        report.charts.push(report::chart_report(chart, &network, done, fields, &summary));
     }
+    report.seams = report::seams(&network);
     report.status = Status::Certified;
-    encode(&found, atlas.charts(), &done, &fields)
+    let mut files = encode(found, atlas.charts(), &done, &fields, &network)?;
+    if settings.hand_off == settings::HandOff::Gmsh {
+        let handed = hand_off::gmsh(&found.mesh, atlas.charts(), &done, &network, settings.size);
+        files.extend(handed.files);
+        report.hand_off = Some(handed.report);
+    }
+    Ok(files)
 }
 
 /// The refusal of a chart that cannot be mapped; a triangle is named by its number in the input.
@@ -295,12 +333,13 @@ fn warn_if_unsolved(chart: &pipeline::atlas::Chart, done: &CertifiedChart) {
     }
 }
 
-/// Encodes surface.vtu and param.vtu.
+/// Encodes what ParaView shows.
 fn encode(
     found: &Repaired,
     charts: &[pipeline::atlas::Chart],
     done: &[CertifiedChart],
     fields: &[Vec<CellFields>],
+    network: &SeamNetwork,
 ) -> Result<Vec<(String, Vec<u8>)>, Reason> {
     let none = |chart: &pipeline::atlas::Chart| vec![false; chart.triangles().len()];
     let invalid = |(c, d): (&_, &CertifiedChart)| d.harmonic.as_ref().map_or(none(c), |h| h.invalid.clone());
@@ -313,8 +352,18 @@ fn encode(
         untangled: &untangled[i],
     };
     let views: Vec<_> = (0..charts.len()).map(view).collect();
-    let failed = |e: vtu::VtuError| Reason::new(Code::Internal, format!("the result cannot be encoded: {e}"));
-    let surface = vtu::surface(&views).map_err(failed)?;
-    let param = vtu::param(&views).map_err(failed)?;
-    Ok(vec![("surface.vtu".to_owned(), surface), ("param.vtu".to_owned(), param)])
+    let files = [
+        ("surface.vtu", vtu::surface(&views).map_err(not_encoded)?),
+        ("param.vtu", vtu::param(&views).map_err(not_encoded)?),
+        ("seams.vtp", vtp::seams(&found.mesh, network).map_err(not_encoded)?),
+        ("atlas.vtm", vtm::blocks(&ATLAS)),
+    ];
+    Ok(files.map(|(name, content)| (name.to_owned(), content)).into())
+}
+
+/// The blocks of atlas.vtm.
+const ATLAS: [(&str, &str); 3] = [("surface", "surface.vtu"), ("param", "param.vtu"), ("seams", "seams.vtp")];
+
+fn not_encoded(error: impl std::fmt::Display) -> Reason {
+    Reason::new(Code::Internal, format!("the result cannot be encoded: {error}"))
 }

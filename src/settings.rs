@@ -15,6 +15,17 @@ pub enum Log {
     Json,
 }
 
+/// The meshers to which results are handed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum HandOff {
+    /// Gmsh: atlas.msh and remesh.geo.
+    #[default]
+    Gmsh,
+    /// None.
+    None,
+}
+
 /// What was said, on the command line or in planish.toml; the same names in both.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -25,6 +36,11 @@ pub struct Said {
     pub order: Option<u8>,
     /// Tolerance for cracks, relative to the diagonal of the bounding box.
     pub weld: Option<f64>,
+    /// Meshers to which results are handed.
+    #[serde(rename = "hand-off")]
+    pub hand_off: Option<HandOff>,
+    /// Edge length of the mesh to be made.
+    pub size: Option<f64>,
     /// Process inputs whose output is up to date, too.
     pub force: Option<bool>,
     /// Form of log messages.
@@ -44,6 +60,10 @@ pub struct Settings {
     pub order: Order,
     /// Tolerance for cracks, relative to the diagonal of the bounding box.
     pub weld: f64,
+    /// Meshers to which results are handed.
+    pub hand_off: HandOff,
+    /// Edge length of the mesh to be made, in the unit of the input; without it, one is chosen.
+    pub size: Option<f64>,
     /// Process inputs whose output is up to date, too.
     pub force: bool,
     /// Form of log messages.
@@ -63,6 +83,9 @@ pub enum SettingsError {
     /// The tolerance is out of range.
     #[error("weld is {0}; it must lie between 0 (close no cracks) and 0.01 of the bounding box's diagonal")]
     Weld(f64),
+    /// The edge length is none.
+    #[error("size is {0}; it must be a positive number: the edge length in the unit of the input")]
+    Size(f64),
     /// The file cannot be read.
     #[error("cannot read the settings file {path}: {error}")]
     Unreadable {
@@ -98,6 +121,8 @@ impl Said {
             out: self.out.or(other.out),
             order: self.order.or(other.order),
             weld: self.weld.or(other.weld),
+            hand_off: self.hand_off.or(other.hand_off),
+            size: self.size.or(other.size),
             force: self.force.or(other.force),
             log: self.log.or(other.log),
             verbose: self.verbose.or(other.verbose),
@@ -119,10 +144,15 @@ impl Said {
         if !(0.0..=0.01).contains(&weld) {
             return Err(SettingsError::Weld(weld));
         }
+        if let Some(size) = self.size.filter(|s| !s.is_normal() || *s < 0.0) {
+            return Err(SettingsError::Size(size));
+        }
         Ok(Settings {
             out: self.out,
             order,
             weld,
+            hand_off: self.hand_off.unwrap_or_default(),
+            size: self.size,
             force: self.force.unwrap_or(false),
             log: self.log.unwrap_or_default(),
             verbose: self.verbose.unwrap_or(0),
@@ -150,6 +180,11 @@ mod tests {
         for weld in [-1e-9, 0.02, f64::NAN] {
             assert!(matches!(Said { weld: Some(weld), ..Said::default() }.check(), Err(SettingsError::Weld(_))));
         }
+        for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(Said { size: Some(size), ..Said::default() }.check(), Err(SettingsError::Size(_))));
+        }
         assert!(toml::from_str::<Said>("oder = 1").is_err(), "unknown keys are errors");
+        let file: Said = toml::from_str("hand-off = \"none\"\nsize = 0.5").expect("valid");
+        assert_eq!((file.hand_off, file.size), (Some(HandOff::None), Some(0.5)));
     }
 }
