@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::settings::{Log, Said, Settings, SettingsError};
+use crate::settings::{FeatureAngle, HandOff, Log, Said, Settings, SettingsError};
 use clap::{ArgAction, Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -39,6 +39,25 @@ pub struct Run {
     /// Order of the elements: 1 (linear) or 2 (quadratic) [default: 2]
     #[arg(long, value_name = "1|2")]
     pub order: Option<u8>,
+    /// Meshers to which results are handed: gmsh writes atlas.msh and remesh.geo [default: gmsh]
+    #[arg(long, value_enum, value_name = "MESHER")]
+    pub hand_off: Option<HandOff>,
+    /// Edge length of the mesh to be made, in the unit of the input [default: that of as many equilateral triangles
+    /// of the same area, but at most 1/50 of the bounding box's diagonal]
+    #[arg(long, value_name = "H")]
+    pub size: Option<f64>,
+    /// Edges with a dihedral angle above DEG degrees are features, along which charts end; off: none are [default: 40]
+    #[arg(long, value_name = "DEG|off")]
+    pub feature_angle: Option<FeatureAngle>,
+    /// Let holes of charts be holes of the surface only
+    #[arg(long)]
+    pub strict_disks: bool,
+    /// Split charts in which the area scale varies by more than a factor R [default: 1e6]
+    #[arg(long, value_name = "R")]
+    pub max_area_ratio: Option<f64>,
+    /// Let no chart have more than N triangles [default: any number]
+    #[arg(long, value_name = "N")]
+    pub max_triangles: Option<usize>,
     /// Process inputs whose output is up to date, too
     #[arg(long)]
     pub force: bool,
@@ -115,6 +134,12 @@ impl Verb {
                     out: run.out.clone(),
                     order: run.order,
                     weld: run.reading.weld,
+                    feature_angle: run.feature_angle,
+                    strict_disks: run.strict_disks.then_some(true),
+                    max_area_ratio: run.max_area_ratio,
+                    max_triangles: run.max_triangles,
+                    hand_off: run.hand_off,
+                    size: run.size,
                     force: run.force.then_some(true),
                     ..Said::default()
                 };

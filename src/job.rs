@@ -1,14 +1,18 @@
 //! One input as it travels: from its file to its published result.
 
-use crate::formats::{self, Kind, vtu};
+use crate::formats::{self, Kind, vtm, vtp, vtu};
+use crate::hand_off;
 use crate::outcome::{Code, Reason, Status};
 use crate::publish::{PublishError, Publisher};
-use crate::report::{self, Input, Output, Report};
-use crate::settings::Settings;
+use crate::report::{self, Decomposition, Input, Output, Report};
+use crate::settings::{self, Settings};
+use pipeline::atlas::Atlas;
+use pipeline::decompose::split_ears;
 use pipeline::distortion::{self, CellFields};
-use pipeline::mesh::TriangleSoup;
+use pipeline::mesh::{SurfaceMesh, TriangleSoup};
 use pipeline::repair::Repaired;
-use pipeline::{CertifiedChart, MapError, decompose, finish_chart, map_chart, repair};
+use pipeline::seams::SeamNetwork;
+use pipeline::{CertifiedChart, MapError, SplitError, decompose, finish_chart, map_or_split, repair};
 use rustix::time::{ClockId, clock_gettime};
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -253,40 +257,95 @@ fn stages(
     let found = repaired(soup, settings)?;
     report.surface = Some(report::surface(&found));
     report.repairs = Some(report::repairs(&found.report));
-    let atlas = decompose(&found.mesh, &Default::default()).map_err(|e| Reason::new(Code::NeedsDecomposition, e))?;
-    let mut done = Vec::new();
-    for chart in atlas.charts() {
-        clock.next(report, Stage::Map);
-        let mapped = map_chart(chart, settings.order).map_err(|e| map_refusal(&e, &found, chart))?;
-        clock.next(report, Stage::Untangle);
-        done.push(finish_chart(mapped));
-    }
-    clock.next(report, Stage::Write);
-    let fields: Vec<_> = atlas.charts().iter().zip(&done).map(|(c, d)| distortion::fields(c, &d.certified)).collect();
-    for ((chart, done), fields) in atlas.charts().iter().zip(&done).zip(&fields) {
-        warn_if_unsolved(chart, done);
-        let summary = distortion::summary(chart, &done.certified, fields);
-        report.charts.push(report::chart_report(chart, done, fields, &summary));
-    }
-    report.status = Status::Certified;
-    encode(&found, atlas.charts(), &done, &fields)
+    let atlas = decompose(&found.mesh, &settings.decompose()).map_err(internal)?;
+    let feature_edges = atlas.feature_edges();
+    report.decomposition = Some(Decomposition { feature_edges, ..Decomposition::default() });
+    let (mesh, atlas) = match split_ears(&found.mesh, &atlas).map_err(internal)? {
+        Some(done) => {
+            report.decomposition.iter_mut().for_each(|d| d.ears_split = done.split);
+            (done.mesh, done.atlas)
+        }
+        None => (found.mesh, atlas),
+    };
+    map_and_write(&mesh, atlas, settings, report, clock)
 }
 
-/// The refusal of a chart that cannot be mapped; a triangle is named by its number in the input.
-fn map_refusal(error: &MapError, found: &Repaired, chart: &pipeline::atlas::Chart) -> Reason {
-    let code = match error {
-        MapError::Linear(pipeline::linear::Error::Solver(pipeline::sparse::Error::TooLarge { .. })) => Code::TooLarge,
-        _ => Code::NeedsSplit,
-    };
-    let place = match error {
-        // Triangles of virtual fans come after those of the chart: they are not in the input.
-        MapError::Linear(pipeline::linear::Error::Folded { first, .. }) => {
-            let face = chart.faces().get(first.index());
-            face.map(|f| format!("triangle {}", found.mesh.source_triangle(f.index())))
+fn internal(fault: impl std::fmt::Display) -> Reason {
+    Reason::new(Code::Internal, format!("{fault}: that is a fault of planish; please report it with the file"))
+}
+
+/// Maps the charts of an atlas that was made otherwise; returns the files of its result and completes the report.
+///
+/// # Errors
+/// The refusal, where a chart cannot be mapped.
+pub fn finish(
+    found: &Repaired,
+    atlas: Atlas,
+    settings: &Settings,
+    report: &mut Report,
+) -> Result<Vec<(String, Vec<u8>)>, Reason> {
+    report.surface = Some(report::surface(found));
+    report.repairs = Some(report::repairs(&found.report));
+    report.decomposition = Some(Decomposition::default());
+    let files = map_and_write(&found.mesh, atlas, settings, report, &mut Clock::new(&|_| ()))?;
+    report.outputs = files.iter().map(|(name, content)| Output::of(name, content)).collect();
+    Ok(files)
+}
+
+/// Maps the charts of an atlas, splitting them where they must be; returns the files of the result and completes the
+/// report.
+///
+/// # Errors
+/// The refusal, where a chart cannot be mapped.
+fn map_and_write(
+    mesh: &SurfaceMesh,
+    atlas: Atlas,
+    settings: &Settings,
+    report: &mut Report,
+    clock: &mut Clock,
+) -> Result<Vec<(String, Vec<u8>)>, Reason> {
+    let whole = atlas.charts().len();
+    let (mut charts, mut done) = (Vec::new(), Vec::new());
+    for chart in atlas.into_charts() {
+        clock.next(report, Stage::Map);
+        let mapped = map_or_split(mesh, chart, settings.order, &settings.decompose()).map_err(|e| map_refusal(&e))?;
+        clock.next(report, Stage::Untangle);
+        for (chart, mapped) in mapped {
+            charts.push(chart);
+            done.push(finish_chart(mapped));
         }
-        _ => None,
+    }
+    clock.next(report, Stage::Write);
+    Atlas::renumber(&mut charts);
+    report.decomposition.iter_mut().for_each(|d| d.charts_by_splitting = charts.len() - whole);
+    let network = SeamNetwork::new(mesh, &charts);
+    let fields: Vec<_> = charts.iter().zip(&done).map(|(c, d)| distortion::fields(c, &d.certified)).collect();
+    for ((chart, done), fields) in charts.iter().zip(&done).zip(&fields) {
+        warn_if_unsolved(chart, done);
+        let summary = distortion::summary(chart, &done.certified, fields);
+        report.charts.push(report::chart_report(chart, &network, done, fields, &summary));
+    }
+    report.seams = report::seams(&network);
+    report.status = Status::Certified;
+    let mut files = encode(mesh, &charts, &done, &fields, &network)?;
+    if settings.hand_off == settings::HandOff::Gmsh {
+        let handed = hand_off::gmsh(mesh, &charts, &done, &network, settings.size);
+        files.extend(handed.files);
+        report.hand_off = Some(handed.report);
+    }
+    Ok(files)
+}
+
+/// The refusal of a chart that cannot be mapped, not even split.
+fn map_refusal(error: &SplitError) -> Reason {
+    let code = match error {
+        SplitError::Map(MapError::Linear(pipeline::linear::Error::Solver(pipeline::sparse::Error::TooLarge {
+            ..
+        }))) => Code::TooLarge,
+        SplitError::Map(_) => Code::NeedsSplit,
+        SplitError::Split(_) => Code::Internal,
     };
-    Reason { code, message: error.to_string(), place }
+    Reason::new(code, error)
 }
 
 fn warn_if_unsolved(chart: &pipeline::atlas::Chart, done: &CertifiedChart) {
@@ -295,26 +354,38 @@ fn warn_if_unsolved(chart: &pipeline::atlas::Chart, done: &CertifiedChart) {
     }
 }
 
-/// Encodes surface.vtu and param.vtu.
+/// Encodes what ParaView shows.
 fn encode(
-    found: &Repaired,
+    mesh: &SurfaceMesh,
     charts: &[pipeline::atlas::Chart],
     done: &[CertifiedChart],
     fields: &[Vec<CellFields>],
+    network: &SeamNetwork,
 ) -> Result<Vec<(String, Vec<u8>)>, Reason> {
     let none = |chart: &pipeline::atlas::Chart| vec![false; chart.triangles().len()];
     let invalid = |(c, d): (&_, &CertifiedChart)| d.harmonic.as_ref().map_or(none(c), |h| h.invalid.clone());
     let untangled: Vec<Vec<bool>> = charts.iter().zip(done).map(invalid).collect();
     let view = |i: usize| vtu::ChartView {
-        mesh: &found.mesh,
+        mesh,
         chart: &charts[i],
         map: &done[i].certified,
         fields: &fields[i],
         untangled: &untangled[i],
+        colour: network.colours()[i],
     };
     let views: Vec<_> = (0..charts.len()).map(view).collect();
-    let failed = |e: vtu::VtuError| Reason::new(Code::Internal, format!("the result cannot be encoded: {e}"));
-    let surface = vtu::surface(&views).map_err(failed)?;
-    let param = vtu::param(&views).map_err(failed)?;
-    Ok(vec![("surface.vtu".to_owned(), surface), ("param.vtu".to_owned(), param)])
+    let files = [
+        ("surface.vtu", vtu::surface(&views).map_err(not_encoded)?),
+        ("param.vtu", vtu::param(&views).map_err(not_encoded)?),
+        ("seams.vtp", vtp::seams(mesh, network).map_err(not_encoded)?),
+        ("atlas.vtm", vtm::blocks(&ATLAS)),
+    ];
+    Ok(files.map(|(name, content)| (name.to_owned(), content)).into())
+}
+
+/// The blocks of atlas.vtm.
+const ATLAS: [(&str, &str); 3] = [("surface", "surface.vtu"), ("param", "param.vtu"), ("seams", "seams.vtp")];
+
+fn not_encoded(error: impl std::fmt::Display) -> Reason {
+    Reason::new(Code::Internal, format!("the result cannot be encoded: {error}"))
 }

@@ -5,6 +5,7 @@
 
 pub mod cli;
 pub mod formats;
+pub mod hand_off;
 pub mod inputs;
 pub mod job;
 pub mod logging;

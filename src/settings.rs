@@ -15,6 +15,52 @@ pub enum Log {
     Json,
 }
 
+/// The meshers to which results are handed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum HandOff {
+    /// Gmsh: atlas.msh and remesh.geo.
+    #[default]
+    Gmsh,
+    /// None.
+    None,
+}
+
+/// The dihedral angle of feature edges.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum FeatureAngle {
+    /// In degrees.
+    Degrees(f64),
+    /// No features.
+    Off(Off),
+}
+
+/// The word `off`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Off {
+    /// The word.
+    Off,
+}
+
+impl FeatureAngle {
+    fn degrees(self) -> Option<f64> {
+        if let Self::Degrees(angle) = self { Some(angle) } else { None }
+    }
+}
+
+impl std::str::FromStr for FeatureAngle {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "off" {
+            return Ok(Self::Off(Off::Off));
+        }
+        text.parse().map(Self::Degrees).map_err(|_| format!("{text} is neither an angle in degrees nor off"))
+    }
+}
+
 /// What was said, on the command line or in planish.toml; the same names in both.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -25,6 +71,23 @@ pub struct Said {
     pub order: Option<u8>,
     /// Tolerance for cracks, relative to the diagonal of the bounding box.
     pub weld: Option<f64>,
+    /// Dihedral angle of feature edges, in degrees, or `off`.
+    #[serde(rename = "feature-angle")]
+    pub feature_angle: Option<FeatureAngle>,
+    /// Whether holes of charts must be holes of the surface.
+    #[serde(rename = "strict-disks")]
+    pub strict_disks: Option<bool>,
+    /// Largest area ratio of a chart.
+    #[serde(rename = "max-area-ratio")]
+    pub max_area_ratio: Option<f64>,
+    /// Largest number of triangles of a chart.
+    #[serde(rename = "max-triangles")]
+    pub max_triangles: Option<usize>,
+    /// Meshers to which results are handed.
+    #[serde(rename = "hand-off")]
+    pub hand_off: Option<HandOff>,
+    /// Edge length of the mesh to be made.
+    pub size: Option<f64>,
     /// Process inputs whose output is up to date, too.
     pub force: Option<bool>,
     /// Form of log messages.
@@ -44,6 +107,18 @@ pub struct Settings {
     pub order: Order,
     /// Tolerance for cracks, relative to the diagonal of the bounding box.
     pub weld: f64,
+    /// Dihedral angle of feature edges, in degrees; none: there are none.
+    pub feature_angle: Option<f64>,
+    /// Whether holes of charts must be holes of the surface.
+    pub strict_disks: bool,
+    /// Largest area ratio of a chart.
+    pub max_area_ratio: f64,
+    /// Largest number of triangles of a chart; none: any.
+    pub max_triangles: Option<usize>,
+    /// Meshers to which results are handed.
+    pub hand_off: HandOff,
+    /// Edge length of the mesh to be made, in the unit of the input; without it, one is chosen.
+    pub size: Option<f64>,
     /// Process inputs whose output is up to date, too.
     pub force: bool,
     /// Form of log messages.
@@ -52,6 +127,18 @@ pub struct Settings {
     pub verbose: u8,
     /// Print nothing but errors.
     pub quiet: bool,
+}
+
+impl Settings {
+    /// What decomposition must respect.
+    pub fn decompose(&self) -> pipeline::decompose::Settings {
+        pipeline::decompose::Settings {
+            max_area_ratio: self.max_area_ratio,
+            max_triangles: self.max_triangles.unwrap_or(usize::MAX),
+            strict_disks: self.strict_disks,
+            feature_angle: self.feature_angle,
+        }
+    }
 }
 
 /// Why settings are refused: wrong usage.
@@ -63,6 +150,18 @@ pub enum SettingsError {
     /// The tolerance is out of range.
     #[error("weld is {0}; it must lie between 0 (close no cracks) and 0.01 of the bounding box's diagonal")]
     Weld(f64),
+    /// The feature angle is out of range.
+    #[error("feature-angle is {0}; it must lie between 0 and 180 degrees (both excluded), or be off")]
+    FeatureAngle(f64),
+    /// The area ratio is out of range.
+    #[error("max-area-ratio is {0}; it must be a number of at least 10")]
+    AreaRatio(f64),
+    /// No triangle is allowed.
+    #[error("max-triangles is 0; a chart needs at least one")]
+    Triangles,
+    /// The edge length is none.
+    #[error("size is {0}; it must be a positive number: the edge length in the unit of the input")]
+    Size(f64),
     /// The file cannot be read.
     #[error("cannot read the settings file {path}: {error}")]
     Unreadable {
@@ -98,6 +197,12 @@ impl Said {
             out: self.out.or(other.out),
             order: self.order.or(other.order),
             weld: self.weld.or(other.weld),
+            feature_angle: self.feature_angle.or(other.feature_angle),
+            strict_disks: self.strict_disks.or(other.strict_disks),
+            max_area_ratio: self.max_area_ratio.or(other.max_area_ratio),
+            max_triangles: self.max_triangles.or(other.max_triangles),
+            hand_off: self.hand_off.or(other.hand_off),
+            size: self.size.or(other.size),
             force: self.force.or(other.force),
             log: self.log.or(other.log),
             verbose: self.verbose.or(other.verbose),
@@ -110,6 +215,7 @@ impl Said {
     /// # Errors
     /// [`SettingsError`] for values out of range.
     pub fn check(self) -> Result<Settings, SettingsError> {
+        let core = pipeline::decompose::Settings::default();
         let order = match self.order.unwrap_or(2) {
             1 => Order::Linear,
             2 => Order::Quadratic,
@@ -119,10 +225,33 @@ impl Said {
         if !(0.0..=0.01).contains(&weld) {
             return Err(SettingsError::Weld(weld));
         }
+        let feature_angle = match self.feature_angle {
+            None => core.feature_angle,
+            Some(angle) => angle.degrees(),
+        };
+        if let Some(angle) = feature_angle.filter(|a| !(*a > 0.0 && *a < 180.0)) {
+            return Err(SettingsError::FeatureAngle(angle));
+        }
+        let max_area_ratio = self.max_area_ratio.unwrap_or(core.max_area_ratio);
+        if !(10.0..=f64::MAX).contains(&max_area_ratio) {
+            return Err(SettingsError::AreaRatio(max_area_ratio));
+        }
+        if self.max_triangles == Some(0) {
+            return Err(SettingsError::Triangles);
+        }
+        if let Some(size) = self.size.filter(|s| !s.is_normal() || *s < 0.0) {
+            return Err(SettingsError::Size(size));
+        }
         Ok(Settings {
             out: self.out,
             order,
             weld,
+            feature_angle,
+            strict_disks: self.strict_disks.unwrap_or(core.strict_disks),
+            max_area_ratio,
+            max_triangles: self.max_triangles,
+            hand_off: self.hand_off.unwrap_or_default(),
+            size: self.size,
             force: self.force.unwrap_or(false),
             log: self.log.unwrap_or_default(),
             verbose: self.verbose.unwrap_or(0),
@@ -150,6 +279,27 @@ mod tests {
         for weld in [-1e-9, 0.02, f64::NAN] {
             assert!(matches!(Said { weld: Some(weld), ..Said::default() }.check(), Err(SettingsError::Weld(_))));
         }
+        for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(Said { size: Some(size), ..Said::default() }.check(), Err(SettingsError::Size(_))));
+        }
+        for angle in [0.0, 180.0, f64::NAN] {
+            let said = Said { feature_angle: Some(FeatureAngle::Degrees(angle)), ..Said::default() };
+            assert!(matches!(said.check(), Err(SettingsError::FeatureAngle(_))));
+        }
+        for ratio in [9.0, f64::NAN, f64::INFINITY] {
+            let said = Said { max_area_ratio: Some(ratio), ..Said::default() };
+            assert!(matches!(said.check(), Err(SettingsError::AreaRatio(_))));
+        }
+        let none = Said { max_triangles: Some(0), ..Said::default() };
+        assert!(matches!(none.check(), Err(SettingsError::Triangles)));
         assert!(toml::from_str::<Said>("oder = 1").is_err(), "unknown keys are errors");
+        let off: Said = toml::from_str("feature-angle = \"off\"\nstrict-disks = true").expect("valid");
+        let off = off.check().expect("in range");
+        assert_eq!((off.feature_angle, off.strict_disks), (None, true));
+        let sharp: Said = toml::from_str("feature-angle = 60").expect("valid");
+        assert_eq!(sharp.check().expect("in range").feature_angle, Some(60.0));
+        assert!(toml::from_str::<Said>("feature-angle = \"of\"").is_err());
+        let file: Said = toml::from_str("hand-off = \"none\"\nsize = 0.5").expect("valid");
+        assert_eq!((file.hand_off, file.size), (Some(HandOff::None), Some(0.5)));
     }
 }

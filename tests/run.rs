@@ -4,6 +4,9 @@ use crate::support::{Out, fixture, planish};
 use planish::outcome::{Code, Status};
 use std::path::Path;
 
+/// The files of a certified result, in their order.
+const ALL_FILES: [&str; 6] = ["surface.vtu", "param.vtu", "seams.vtp", "atlas.vtm", "atlas.msh", "remesh.geo"];
+
 /// A refused input has its report; its place and remedy are told.
 #[test]
 fn refusals_say_where_and_what_to_do() {
@@ -71,7 +74,15 @@ fn wrong_usage_is_exit_code_2_and_does_nothing() {
     let copy = twin.path().join("disk.stl");
     std::fs::copy(&disk, &copy).expect("copied");
     assert_eq!(out.run(&[&disk, &copy], &[]).code, Some(2), "two inputs of the same name");
-    for extra in [["--order", "3"], ["--weld", "0.5"], ["--weld", "nan"], ["--config", "no/such.toml"]] {
+    let wrong = [
+        ["--order", "3"],
+        ["--weld", "0.5"],
+        ["--weld", "nan"],
+        ["--size", "0"],
+        ["--hand-off", "mmg"],
+        ["--config", "no/such.toml"],
+    ];
+    for extra in wrong {
         assert_eq!(out.run(&[&disk], &extra).code, Some(2), "{extra:?}");
     }
     assert_eq!(out.run(&[&disk], &["--no-such-option"]).code, Some(2));
@@ -132,7 +143,7 @@ fn order_1_writes_the_same_files_with_straight_triangles() {
     assert_eq!(out.run(&[&fixture("disk_with_holes.stl")], &["--order", "1"]).code, Some(0));
     let report = out.report("disk_with_holes.stl");
     let files: Vec<_> = report.outputs.iter().map(|o| o.file.as_str()).collect();
-    assert_eq!((files, report.settings.order), (vec!["surface.vtu", "param.vtu"], 1));
+    assert_eq!((files, report.settings.order), (ALL_FILES.to_vec(), 1));
     let chart = &report.charts[0];
     assert_eq!((&chart.quadratic, &chart.untangle, chart.certificate.by_exact), (&None, &None, 0));
     let grid = planish::formats::vtu::read(&out.read("disk_with_holes.stl", "surface.vtu")).expect("readable");
@@ -143,6 +154,29 @@ fn order_1_writes_the_same_files_with_straight_triangles() {
         }
     }
     assert_eq!(planish(["check".as_ref(), out.of("disk_with_holes.stl").as_os_str()]).code, Some(0));
+}
+
+#[test]
+fn the_hand_off_can_be_left_out_and_its_size_chosen() {
+    let (out, disk) = (Out::new(), fixture("disk.stl"));
+    assert_eq!(out.run(&[&disk], &["--hand-off", "none"]).code, Some(0));
+    let report = out.report("disk.stl");
+    let files: Vec<_> = report.outputs.iter().map(|o| o.file.as_str()).collect();
+    assert_eq!((files, report.hand_off), (ALL_FILES[..4].to_vec(), None));
+    assert_eq!(planish(["check".as_ref(), out.of("disk.stl").as_os_str()]).code, Some(0));
+    out.run(&[&disk], &[]);
+    let default = out.report("disk.stl").hand_off.expect("a hand-off");
+    assert_eq!((default.sub_triangles, default.refined, default.failure), (4 * 384, 0, None));
+    let diagonal = 0.02 * (8.0_f64 + 0.3).sqrt();
+    assert!(default.size > 0.9 * diagonal && default.size < 1.1 * diagonal, "{}", default.size);
+    out.run(&[&disk], &["--size", "0.25"]);
+    assert_eq!(out.report("disk.stl").hand_off.expect("a hand-off").size, 0.25);
+    let script = String::from_utf8(out.read("disk.stl", "remesh.geo")).expect("UTF-8");
+    assert!(script.contains("size = {0.25,"), "{script}");
+    // A result without its hand-off is not complete.
+    std::fs::remove_file(out.of("disk.stl").join("remesh.geo")).expect("removed");
+    let ended = planish(["check".as_ref(), out.of("disk.stl").as_os_str()]);
+    assert!(ended.code == Some(1) && ended.err.contains("remesh.geo"), "{}", ended.err);
 }
 
 #[test]

@@ -90,11 +90,27 @@ impl Chart {
 #[derive(Clone, Debug)]
 pub struct Atlas {
     pub(crate) charts: Vec<Chart>,
+    pub(crate) feature_edges: usize,
 }
 
 impl Atlas {
     /// The charts, in the order of their ids.
     pub fn charts(&self) -> &[Chart] {
         &self.charts
+    }
+
+    /// The feature edges that were found.
+    pub fn feature_edges(&self) -> usize {
+        self.feature_edges
+    }
+
+    /// The charts, one by one.
+    pub fn into_charts(self) -> Vec<Chart> {
+        self.charts
+    }
+
+    /// Numbers charts (those of an atlas, some of them split) in the order given.
+    pub fn renumber<'a>(charts: impl IntoIterator<Item = &'a mut Chart>) {
+        charts.into_iter().enumerate().for_each(|(i, chart)| chart.id = ChartId::at(i));
     }
 }

@@ -58,6 +58,8 @@ pub enum MapError {
 pub struct CertifiedChart {
     /// The map. Nodes: the vertices of the chart, then its edges, in its numbering.
     pub certified: CertifiedMap,
+    /// The raised linear map, from which untangling starts: its triangles inside are straight.
+    pub start: CertifiedMap,
     /// The linear map.
     pub linear: LinearMap,
     /// The harmonic map, where it was asked for and could be computed.
@@ -158,7 +160,8 @@ pub enum SplitError {
 /// feasible start.
 pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
     let MappedChart { closed, linear, start, certified_start, harmonic } = mapped;
-    let base = CertifiedChart { certified: certified_start, linear, harmonic: None, untangle: None, unsolved: None };
+    let (certified, start_map) = (certified_start.clone(), certified_start);
+    let base = CertifiedChart { certified, start: start_map, linear, harmonic: None, untangle: None, unsolved: None };
     let map = match harmonic {
         None => return base,
         Some(Err(unsolved)) => return CertifiedChart { unsolved: Some(unsolved), ..base },

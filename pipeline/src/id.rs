@@ -62,6 +62,11 @@ id!(
     ChartId,
     "c"
 );
+id!(
+    /// A curve between charts, or of the open boundary.
+    CurveId,
+    "s"
+);
 
 impl HalfEdgeId {
     /// Side `side` (0, 1 or 2) of `face`.
@@ -98,6 +103,7 @@ mod tests {
     fn ids_print_with_their_letter() {
         let shown = format!("{} {} {} {} {}", VertexId(12), EdgeId(3), FaceId(5), HalfEdgeId(7), ChartId(9));
         assert_eq!(shown, "v12 e3 f5 h7 c9");
+        assert_eq!(CurveId(4).to_string(), "s4");
     }
 
     #[test]

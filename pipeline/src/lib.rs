@@ -8,7 +8,8 @@
 //!    triangles may be invalid.
 //! 4. [`finish_chart`] makes them valid ([`mod@untangle`]) while keeping the Dirichlet energy as low as it can be, and
 //!    proves the result one-to-one ([`certify`]).
-//! 5. [`distortion`] measures what came out.
+//! 5. [`distortion`] measures what came out; [`seams`] finds the curves between charts.
+//! 6. [`mod@subdivide`] makes linear triangulations of certified maps, for meshers.
 //!
 //! # What is promised
 //!
@@ -60,11 +61,14 @@ mod weights;
 pub mod boundary;
 pub mod certify;
 mod chart_map;
+pub mod curvature;
 pub mod decompose;
 pub mod distortion;
 pub mod linear;
 pub mod quadratic;
 pub mod repair;
+pub mod seams;
+pub mod subdivide;
 pub mod untangle;
 
 pub use chart_map::{
@@ -73,3 +77,4 @@ pub use chart_map::{
 };
 pub use decompose::decompose;
 pub use repair::repair;
+pub use subdivide::subdivide;

@@ -190,6 +190,44 @@ pub fn sphere(n: u32) -> TriangleSoup {
     soup(points, triangles)
 }
 
+/// A torus of `n` (at least 3) squares around the axis and `m` (at least 3) around the tube.
+pub fn ring_torus(n: u32, m: u32) -> TriangleSoup {
+    let point = |i: u32, j: u32| {
+        let (around, tube) = (TAU * f64::from(i) / f64::from(n), TAU * f64::from(j) / f64::from(m));
+        let r = 1.0 + 0.4 * tube.cos();
+        [r * around.cos(), r * around.sin(), 0.4 * tube.sin()]
+    };
+    let points = (0..n).flat_map(|i| (0..m).map(move |j| point(i, j))).collect();
+    let at = |i: u32, j: u32| i % n * m + j % m;
+    let squares = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
+    let halves = squares
+        .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]);
+    soup(points, halves.collect())
+}
+
+/// A book: `pages` (at least 3) bent rectangles of `n` x `n` squares that meet in a straight spine, which is not
+/// manifold. Page k holds the triangles from 2 k n^2 on; every second page lies on its other face.
+pub fn book(pages: u32, n: u32) -> TriangleSoup {
+    let point = |page: u32, i: u32, j: u32| {
+        let (out, along) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+        let angle = TAU * f64::from(page) / f64::from(pages) + 0.4 * out;
+        [out * angle.cos(), out * angle.sin(), along + 0.1 * out * (3.0 * along).sin()]
+    };
+    // The spine comes first, then page after page.
+    let mut points: Vec<Vec3> = (0..=n).map(|j| point(0, 0, j)).collect();
+    let mut triangles = Vec::new();
+    for page in 0..pages {
+        let base = points.len() as u32;
+        points.extend((1..=n).flat_map(|i| (0..=n).map(move |j| point(page, i, j))));
+        let at = |i: u32, j: u32| if i == 0 { j } else { base + (i - 1) * (n + 1) + j };
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+            triangles.extend(if page % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
+        }
+    }
+    soup(points, triangles)
+}
+
 /// A finger: a disk whose middle is drawn out to a closed tube of height `length` (in diameters of the tube).
 /// Its map needs an area ratio of about e^(4 `length`).
 pub fn finger(around: u32, length: u32) -> TriangleSoup {
@@ -259,5 +297,7 @@ mod tests {
         check(cracked_patch(), 1, 1, Some(0), true);
         check(sphere(6), 1, 0, Some(0), true);
         check(finger(12, 2), 1, 1, Some(0), true);
+        check(ring_torus(9, 6), 1, 0, Some(1), true);
+        check(book(3, 4), 3, 3, Some(0), true);
     }
 }

@@ -1,8 +1,11 @@
 //! File formats: which there are, and reading a soup of triangles from the bytes of a file.
 
+pub mod gmsh;
 mod obj;
 mod polygon;
 mod stl;
+pub mod vtm;
+pub mod vtp;
 pub mod vtu;
 
 use crate::outcome::{Code, Reason};

@@ -26,6 +26,8 @@ pub struct ChartView<'a> {
     pub fields: &'a [CellFields],
     /// Per triangle, whether it was invalid and was repaired.
     pub untangled: &'a [bool],
+    /// A small number that differs from that of every neighbour.
+    pub colour: u32,
 }
 
 /// Why a file cannot be written or read.
@@ -144,7 +146,7 @@ fn point_fields(views: &[ChartView]) -> Vec<Attribute> {
     let uv: Vec<f64> = views.iter().flat_map(nodes).flat_map(|p| p.uv()).collect();
     let mut vertex: Vec<i32> = Vec::new();
     for view in views {
-        let welded = |v: &pipeline::id::VertexId| view.mesh.welded_vertex(*v) as i32;
+        let welded = |v: &pipeline::id::VertexId| view.mesh.input_vertex(*v).map_or(-2, |w| w as i32);
         vertex.extend(view.chart.vertices().iter().map(welded));
         vertex.resize(vertex.len() + view.map.map().nodes.len() - view.chart.vertices().len(), -1);
     }
@@ -154,6 +156,7 @@ fn point_fields(views: &[ChartView]) -> Vec<Attribute> {
 /// The fields of every triangle.
 fn cell_fields(views: &[ChartView]) -> Vec<Attribute> {
     let chart: Vec<i32> = views.iter().zip(0..).flat_map(|(v, i)| vec![i; v.fields.len()]).collect();
+    let colour: Vec<i32> = views.iter().flat_map(|v| vec![v.colour as i32; v.fields.len()]).collect();
     let source = |v: &ChartView| -> Vec<i32> {
         v.chart.faces().iter().map(|f| v.mesh.source_triangle(f.index()) as i32).collect()
     };
@@ -171,6 +174,7 @@ fn cell_fields(views: &[ChartView]) -> Vec<Attribute> {
         field("conformal_distortion", |f| f.conformal_distortion),
         field("area_scale", |f| f.area_scale),
         array("untangled", 1, untangled),
+        array("colour", 1, colour),
     ]
 }
 

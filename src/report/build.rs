@@ -1,8 +1,8 @@
 //! From the core's numbers to the report's.
 
 use super::{
-    Boundary, Certificate, ChartReport, Counts, Distortion, Linear, Quadratic, RepairedSurface, Repairs, Surface,
-    Untangle,
+    Boundary, Certificate, ChartReport, Counts, Distortion, Linear, Quadratic, RepairedSurface, Repairs, Seam, Seams,
+    Surface, Untangle,
 };
 use pipeline::CertifiedChart;
 use pipeline::atlas::Chart;
@@ -10,6 +10,7 @@ use pipeline::certify::{CertifiedMap, PlanarMap};
 use pipeline::distortion::{CellFields, Summary};
 use pipeline::mesh::Census;
 use pipeline::repair::{self, Repaired};
+use pipeline::seams::{Curve, SeamNetwork};
 use pipeline::{linear, untangle};
 
 /// The surface before and after repair.
@@ -64,16 +65,58 @@ pub fn repairs(report: &repair::Report) -> Repairs {
     }
 }
 
+/// The curves between charts.
+pub fn seams(network: &SeamNetwork) -> Seams {
+    let list: Vec<Seam> = network.seams().map(seam).collect();
+    let lengths = || list.iter().map(|s| s.length);
+    let mut ends: Vec<usize> = network.seams().flat_map(Curve::ends).collect();
+    ends.sort_unstable();
+    ends.dedup();
+    Seams {
+        curves: list.len(),
+        corners: ends.iter().filter(|p| network.points()[**p].corner).count(),
+        length_total: lengths().sum(),
+        length_max: lengths().fold(0.0, f64::max),
+        list,
+    }
+}
+
+fn seam(curve: &Curve) -> Seam {
+    Seam {
+        id: curve.id().0,
+        charts: curve.sides().iter().map(|s| s.chart.0).collect(),
+        length: curve.length(),
+        edges: curve.segments(),
+        closed: curve.is_closed(),
+    }
+}
+
+/// The seams that the loops of a chart pass, ascending.
+fn seams_of(chart: &Chart, network: &SeamNetwork) -> Vec<u32> {
+    let passed = network.loops(chart.id()).iter().flatten().map(|p| p.curve);
+    let mut seams: Vec<u32> = passed.filter(|c| !network.curves()[c.index()].is_open()).map(|c| c.0).collect();
+    seams.sort_unstable();
+    seams.dedup();
+    seams
+}
+
 /// A chart with its certified map.
-pub fn chart_report(chart: &Chart, done: &CertifiedChart, fields: &[CellFields], summary: &Summary) -> ChartReport {
+pub fn chart_report(
+    chart: &Chart,
+    network: &SeamNetwork,
+    done: &CertifiedChart,
+    fields: &[CellFields],
+    summary: &Summary,
+) -> ChartReport {
     let unit = chart.scale() * chart.scale();
     let det_min = fields.iter().map(|f| f.det_min).fold(f64::MAX, f64::min);
     ChartReport {
         id: chart.id().0,
         triangles: chart.triangles().len(),
         loops: 1 + chart.holes().len(),
-        seams: vec![],
-        neighbours: vec![],
+        colour: network.colours()[chart.id().index()],
+        seams: seams_of(chart, network),
+        neighbours: network.neighbours(chart.id()).iter().map(|c| c.0).collect(),
         linear: Linear {
             folded: done.linear.folded(),
             edges_changed: done.linear.edges_changed(),

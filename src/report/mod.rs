@@ -4,8 +4,8 @@
 mod build;
 
 use crate::outcome::{Reason, Status};
-use crate::settings::Settings;
-pub use build::{certificate, chart_checksum, chart_report, repairs, surface};
+use crate::settings::{self, Settings};
+pub use build::{certificate, chart_checksum, chart_report, repairs, seams, surface};
 use pipeline::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -37,10 +37,14 @@ pub struct Report {
     pub refused_components: Vec<RefusedComponent>,
     /// What repair did.
     pub repairs: Option<Repairs>,
+    /// How the surface was cut into charts.
+    pub decomposition: Option<Decomposition>,
     /// The charts.
     pub charts: Vec<ChartReport>,
     /// The curves between charts.
     pub seams: Seams,
+    /// The hand-off to a mesher; null where there was none to be made.
+    pub hand_off: Option<HandOff>,
     /// The other files of the result.
     pub outputs: Vec<Output>,
     /// CPU seconds per stage: the only part that differs from run to run.
@@ -65,11 +69,32 @@ pub struct ResultSettings {
     pub order: u8,
     /// Tolerance for cracks.
     pub weld: f64,
+    /// Dihedral angle of feature edges, in degrees; null: off.
+    pub feature_angle: Option<f64>,
+    /// Whether holes of charts are holes of the surface.
+    pub strict_disks: bool,
+    /// Largest area ratio of a chart.
+    pub max_area_ratio: f64,
+    /// Largest number of triangles of a chart; null: any.
+    pub max_triangles: Option<usize>,
+    /// Mesher to which the result is handed.
+    pub hand_off: settings::HandOff,
+    /// Edge length that was asked for; null for the default.
+    pub size: Option<f64>,
 }
 
 impl From<&Settings> for ResultSettings {
     fn from(settings: &Settings) -> Self {
-        Self { order: if settings.order == Order::Linear { 1 } else { 2 }, weld: settings.weld }
+        Self {
+            order: if settings.order == Order::Linear { 1 } else { 2 },
+            weld: settings.weld,
+            feature_angle: settings.feature_angle,
+            strict_disks: settings.strict_disks,
+            max_area_ratio: settings.max_area_ratio,
+            max_triangles: settings.max_triangles,
+            hand_off: settings.hand_off,
+            size: settings.size,
+        }
     }
 }
 
@@ -153,6 +178,17 @@ pub struct Repairs {
     pub first: BTreeMap<String, Vec<u32>>,
 }
 
+/// How the surface was cut into charts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Decomposition {
+    /// Edges along features.
+    pub feature_edges: usize,
+    /// Triangles with two edges at the boundary of their chart, whose inner edge was split.
+    pub ears_split: usize,
+    /// How many of the charts came from splitting others that were too distorted or could not be mapped.
+    pub charts_by_splitting: usize,
+}
+
 /// A component that was refused.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RefusedComponent {
@@ -171,6 +207,8 @@ pub struct ChartReport {
     pub triangles: usize,
     /// Its boundary loops, the outer one included.
     pub loops: usize,
+    /// A small number that differs from that of every neighbour.
+    pub colour: u32,
     /// Numbers of the seams around it.
     pub seams: Vec<u32>,
     /// Charts beside it.
@@ -284,6 +322,44 @@ pub struct Seams {
     pub length_total: f64,
     /// The longest one.
     pub length_max: f64,
+    /// Each of them; `id` is the number of the curve in seams.vtp.
+    pub list: Vec<Seam>,
+}
+
+/// A curve between charts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Seam {
+    /// Its number among all curves, those of the open boundary included.
+    pub id: u32,
+    /// The charts beside it.
+    pub charts: Vec<u32>,
+    /// Its length.
+    pub length: f64,
+    /// Its edges.
+    pub edges: usize,
+    /// Whether it ends where it begins.
+    pub closed: bool,
+}
+
+/// The hand-off to a mesher.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct HandOff {
+    /// The edge length that it asks for.
+    pub size: f64,
+    /// Triangles of the linear triangulation.
+    pub sub_triangles: usize,
+    /// Curved triangles that were split into other than four.
+    pub refined: usize,
+    /// Charts that are handed over by their linear map.
+    pub linear_charts: Vec<u32>,
+    /// Nodes that were moved so that every triangle has a normal.
+    pub moved_vertices: usize,
+    /// Shortest distance between two seams of a chart that share no end; null where there are no two.
+    pub shortest_seam_distance: Option<f64>,
+    /// What may go wrong with this edge length.
+    pub warning: Option<String>,
+    /// Why there is no hand-off.
+    pub failure: Option<String>,
 }
 
 /// A file of the result.
@@ -317,8 +393,10 @@ impl Report {
             surface: None,
             refused_components: vec![],
             repairs: None,
+            decomposition: None,
             charts: vec![],
             seams: Seams::default(),
+            hand_off: None,
             outputs: vec![],
             timing: BTreeMap::new(),
         }

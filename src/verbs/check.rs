@@ -6,16 +6,21 @@
 //! fails the first one even if all checksums were made anew.
 
 use super::{Exit, say, shown};
+use crate::formats::gmsh;
 use crate::formats::vtu::{self, Grid};
 use crate::job::{guard, read_file};
 use crate::outcome::{Reason, Status};
 use crate::report::{self, ChartReport, Report, certificate, chart_checksum};
+use crate::settings::HandOff;
 use pipeline::certify::{self, PlanarMap, prove};
 use pipeline::grid::GridPoint;
 use std::path::{Path, PathBuf};
 
 /// The files that every certified result has.
-const REQUIRED: [&str; 2] = ["surface.vtu", "param.vtu"];
+const REQUIRED: [&str; 4] = ["surface.vtu", "param.vtu", "seams.vtp", "atlas.vtm"];
+
+/// The files of a hand-off to Gmsh.
+const HANDED_OFF: [&str; 2] = [gmsh::ATLAS, gmsh::REMESH];
 
 /// What can be wrong with a result.
 #[derive(Debug, thiserror::Error)]
@@ -124,7 +129,14 @@ fn read_report(folder: &Path) -> Result<Report, Finding> {
 /// Sizes and hashes of all files.
 fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
     let unlisted = |name: &&&str| !report.outputs.iter().any(|o| o.file == **name);
-    let missing = REQUIRED.iter().filter(unlisted).map(|name| file(name, "is not listed in the report's outputs"));
+    let asked_for = report.settings.hand_off == HandOff::Gmsh;
+    let failed = report.hand_off.as_ref().is_some_and(|h| h.failure.is_some());
+    let handed_off = HANDED_OFF.iter().filter(|_| asked_for && !failed);
+    let missing = REQUIRED
+        .iter()
+        .chain(handed_off)
+        .filter(unlisted)
+        .map(|name| file(name, "is not listed in the report's outputs"));
     let damaged = report.outputs.iter().filter_map(|output| {
         // Names come from the report: only plain ones are opened.
         if Path::new(&output.file).file_name() != Some(output.file.as_ref()) {

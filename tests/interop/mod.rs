@@ -3,6 +3,8 @@
 //! The Python environment is made beside the sources (`.venv`, not under version control) when a test first needs
 //! it, with the packages of requirements.txt.
 
+mod remesh;
+
 use crate::support::{Out, fixture, root};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

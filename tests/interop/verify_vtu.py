@@ -1,5 +1,5 @@
-"""verify_vtu.py [--break] RESULT...: opens surface.vtu and param.vtu of each result with the real VTK, and proves
-from surface.vtu alone that every curved parametric triangle is valid.
+"""verify_vtu.py [--break] RESULT...: opens surface.vtu, param.vtu, seams.vtp and atlas.vtm of each result with the
+real VTK, and proves from surface.vtu alone that every curved parametric triangle is valid.
 
 This is no translation of planish's own proof: the jacobian is expanded into the monomials of a polynomial in two
 variables with rational coefficients, and its minimum over the closed triangle is found from stationary points.
@@ -14,15 +14,17 @@ from fractions import Fraction
 import numpy
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkFileOutputWindow, vtkOutputWindow
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+from vtkmodules.vtkIOXML import (
+    vtkXMLMultiBlockDataReader, vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader)
 
 POINT_FIELDS = {"uv": 2, "vertex": 1}
 CELL_FIELDS = ["chart", "triangle", "det_min", "det_max", "jacobian_ratio", "conformal_distortion", "area_scale", "untangled"]
-QUADRATIC_TRIANGLE = 22
+SEAM_FIELDS = ["curve", "open", "sides", "chart_a", "chart_b", "length"]
+QUADRATIC_TRIANGLE, VERTEX, POLYLINE, LINE = 22, 1, 4, 3
 
 
-def read(path, messages):
-    reader = vtkXMLUnstructuredGridReader()
+def read(path, messages, reader=None):
+    reader = reader or vtkXMLUnstructuredGridReader()
     reader.AddObserver("ErrorEvent", lambda *_: messages.append(f"{path}: error"))
     reader.AddObserver("WarningEvent", lambda *_: messages.append(f"{path}: warning"))
     reader.SetFileName(path)
@@ -44,6 +46,41 @@ def check_fields(path, grid):
         assert array is not None, f"{path}: no cell field {name}"
         assert array.GetNumberOfTuples() == cells, f"{path}: {name}"
         assert numpy.isfinite(vtk_to_numpy(array)).all(), f"{path}: {name} is not finite"
+
+
+def check_seams(folder, messages):
+    """Every curve is a polyline of its length; corners are vertex cells that come first."""
+    path = f"{folder}/seams.vtp"
+    seams = read(path, messages, vtkXMLPolyDataReader())
+    count = seams.GetNumberOfCells()
+    fields = {name: seams.GetCellData().GetArray(name) for name in SEAM_FIELDS}
+    assert all(f is not None and f.GetNumberOfTuples() == count for f in fields.values()), f"{path}: cell fields"
+    vertex = seams.GetPointData().GetArray("vertex")
+    assert vertex is not None and vertex.GetNumberOfTuples() == seams.GetNumberOfPoints(), f"{path}: vertex"
+    fields = {name: vtk_to_numpy(f) for name, f in fields.items()}
+    points = vtk_to_numpy(seams.GetPoints().GetData())
+    for i in range(count):
+        ids = seams.GetCell(i).GetPointIds()
+        nodes = points[[ids.GetId(k) for k in range(ids.GetNumberOfIds())]]
+        is_corner = fields["curve"][i] == -1
+        assert seams.GetCellType(i) in ([VERTEX] if is_corner else [POLYLINE, LINE]), f"{path}: cell {i}"
+        length = numpy.sqrt((numpy.diff(nodes, axis=0) ** 2).sum(1)).sum()
+        assert abs(length - fields["length"][i]) <= 1e-9 * length, f"{path}: length of cell {i}"
+        assert is_corner or (fields["sides"][i] == 1) == (fields["open"][i] == 1) == (fields["chart_b"][i] == -1)
+    curves = fields["curve"][fields["curve"] >= 0]
+    assert len(curves) > 0 and (curves == numpy.arange(len(curves))).all(), f"{path}: curves {curves}"
+
+
+def check_atlas(folder, grids, messages):
+    """atlas.vtm opens all of the files."""
+    reader = vtkXMLMultiBlockDataReader()
+    read(f"{folder}/atlas.vtm", messages, reader)
+    atlas = reader.GetOutput()
+    names = [atlas.GetMetaData(i).Get(atlas.NAME()) for i in range(atlas.GetNumberOfBlocks())]
+    assert names == ["surface", "param", "seams"], f"{folder}/atlas.vtm: blocks {names}"
+    for i, grid in enumerate(grids):
+        assert atlas.GetBlock(i).GetNumberOfCells() == grid.GetNumberOfCells(), f"{folder}/atlas.vtm: {names[i]}"
+    assert atlas.GetBlock(2).GetNumberOfCells() > 0
 
 
 def jacobian(nodes):
@@ -111,6 +148,8 @@ def surely_positive(nodes):
 def verify(folder, broken):
     messages = []
     surface, param = (read(f"{folder}/{name}", messages) for name in ("surface.vtu", "param.vtu"))
+    check_seams(folder, messages)
+    check_atlas(folder, (surface, param), messages)
     assert not messages, messages
     for name, grid in (("surface.vtu", surface), ("param.vtu", param)):
         check_fields(f"{folder}/{name}", grid)

@@ -13,7 +13,7 @@ use crate::mesh::{EdgeTable, SurfaceMesh};
 pub fn assemble(mesh: &SurfaceMesh, labels: &[u32]) -> Result<Atlas, Illegal> {
     let sets = by_label(labels);
     let charts = sets.into_iter().zip(0..).map(|(faces, id)| chart(mesh, ChartId(id), faces));
-    Ok(Atlas { charts: charts.collect::<Result<_, _>>()? })
+    Ok(Atlas { charts: charts.collect::<Result<_, _>>()?, feature_edges: 0 })
 }
 
 /// The faces of each label, ascending; labels in the order of their first faces.

@@ -8,6 +8,8 @@
 
 mod assemble;
 mod dual;
+mod ears;
+mod features;
 mod judge;
 mod legality;
 mod merge;
@@ -25,6 +27,8 @@ use crate::id::HalfEdgeId;
 use crate::mesh::{Census, SurfaceMesh};
 pub use assemble::assemble;
 use dual::Dual;
+pub use ears::{WithoutEars, split_ears};
+use features::mark_features;
 use judge::{Verdict, choose_outer, judge};
 pub use legality::Illegal;
 use merge::Limits;
@@ -66,11 +70,14 @@ pub struct Settings {
     pub max_triangles: usize,
     /// Whether all inner loops of a chart must be holes of the surface.
     pub strict_disks: bool,
+    /// The dihedral angle, in degrees, above which an edge is a feature: seams follow features, and charts do not
+    /// cross those that separate them. In (0, 180); default 40; none: there are no features.
+    pub feature_angle: Option<f64>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { max_area_ratio: 1e6, max_triangles: usize::MAX, strict_disks: false }
+        Self { max_area_ratio: 1e6, max_triangles: usize::MAX, strict_disks: false, feature_angle: Some(40.0) }
     }
 }
 
@@ -79,13 +86,17 @@ impl Default for Settings {
 /// # Errors
 /// [`Error`].
 pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error> {
-    let dual = Dual::new(mesh);
+    let mut dual = Dual::new(mesh);
+    let features = settings.feature_angle.map_or(0, |angle| mark_features(&mut dual, angle));
+    let dual = dual;
     let limits = Limits::new(settings);
     let cells = cells(&dual, &limits);
     let graph = CellGraph::new(&dual, &cells);
     let charts = Search { dual: &dual, cells: &cells, graph: &graph, limits }.run();
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
-    finish(&dual, labels, limits, settings, &cells, |h| graph.area(cells.of[h.face().index()]).sqrt())
+    let size = |h: HalfEdgeId| graph.area(cells.of[h.face().index()]).sqrt();
+    let atlas = finish(&dual, labels, limits, settings, &cells, size)?;
+    Ok(Atlas { feature_edges: features, ..atlas })
 }
 
 /// Straightens the seams between labels and makes the charts. `size` tells that of a cell.

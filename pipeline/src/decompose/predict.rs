@@ -27,6 +27,8 @@ struct Link {
     to: u32,
     conductance: f64,
     distance: f64,
+    /// Whether more than half of the common edge is a feature.
+    feature: bool,
 }
 
 impl CellGraph {
@@ -46,8 +48,10 @@ impl CellGraph {
         for run in pairs.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
             let (a, b, _) = run[0];
             let length: f64 = run.iter().map(|(_, _, h)| dual.length(*h)).sum();
+            let sharp: f64 = run.iter().filter(|(_, _, h)| dual.is_feature(*h)).map(|(_, _, h)| dual.length(*h)).sum();
             let distance = graph.spacing(a, b);
-            graph.links.push(Link { to: b, conductance: length / distance, distance });
+            let feature = 2.0 * sharp > length;
+            graph.links.push(Link { to: b, conductance: length / distance, distance, feature });
             graph.starts[a as usize + 1] += 1;
         }
         (0..cells.count).for_each(|c| graph.starts[c + 1] += graph.starts[c]);
@@ -70,13 +74,15 @@ impl CellGraph {
     }
 }
 
+/// Without the links across features.
 impl Graph for CellGraph {
     fn len(&self) -> usize {
         self.areas.len()
     }
 
     fn each_neighbour(&self, node: usize, mut visit: impl FnMut(usize, f64)) {
-        self.links(node as u32).iter().for_each(|l| visit(l.to as usize, l.distance));
+        let smooth = self.links(node as u32).iter().filter(|l| !l.feature);
+        smooth.for_each(|l| visit(l.to as usize, l.distance));
     }
 }
 

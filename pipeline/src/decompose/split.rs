@@ -5,6 +5,7 @@
 //! size. A chart is planar, so two connected parts of it are charts wherever neither touches itself.
 
 use super::dual::Dual;
+use super::features::mark_features;
 use super::merge::Limits;
 use super::regions::Regions;
 use super::voronoi::{Cells, bisect_until, farthest_first};
@@ -35,7 +36,11 @@ pub fn split(
         return Ok(None);
     }
     let part = mesh.part(chart);
-    let dual = Dual::new(&part);
+    let mut dual = Dual::new(&part);
+    settings.feature_angle.iter().for_each(|angle| {
+        mark_features(&mut dual, *angle);
+    });
+    let dual = dual;
     let limits = Limits::new(settings);
     let by_scale = log_scale.and_then(|s| across_protrusion(&dual, s, &limits));
     let labels = by_scale.unwrap_or_else(|| halves(&dual, &limits));

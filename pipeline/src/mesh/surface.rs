@@ -14,6 +14,8 @@ pub struct SurfaceMesh {
     pub(crate) triangles: Vec<[VertexId; 3]>,
     pub(crate) source: Vec<u32>,
     pub(crate) welded: Vec<u32>,
+    /// Vertices from this one on are not of the input.
+    pub(crate) added_from: usize,
     pub(crate) edges: EdgeTable,
     pub(crate) census: Census,
     pub(crate) metric: Metric,
@@ -39,6 +41,11 @@ impl SurfaceMesh {
     /// order of their first appearance.
     pub fn welded_vertex(&self, vertex: VertexId) -> u32 {
         self.welded[vertex.index()]
+    }
+
+    /// The welded vertex, unless `vertex` was added: then it has a number there that no vertex of the input has.
+    pub fn input_vertex(&self, vertex: VertexId) -> Option<u32> {
+        (vertex.index() < self.added_from).then(|| self.welded[vertex.index()])
     }
 
     /// The edges.
@@ -71,6 +78,7 @@ impl SurfaceMesh {
             points: chart.vertices().iter().map(|v| self.points[vertex(v)]).collect(),
             welded: chart.vertices().iter().map(|v| self.welded[vertex(v)]).collect(),
             source: chart.faces().iter().map(|f| self.source[f.index()]).collect(),
+            added_from: chart.vertices().partition_point(|v| v.index() < self.added_from),
             census: Census::new(&triangles, &edges),
             metric: Metric {
                 shapes: chart.shapes().to_vec(),

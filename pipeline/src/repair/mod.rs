@@ -229,7 +229,8 @@ impl Draft {
         let edges = renewed(edges, report.split_vertices.count > 0, &triangles);
         let nonmanifold_vertices = pinned_vertices(&welded, &triangles, &edges);
         let census = Census { nonmanifold_edges, nonmanifold_vertices, ..Census::new(&triangles, &edges) };
-        SurfaceMesh { points, triangles, source: self.source, welded, edges, census, metric }
+        let added_from = points.len();
+        SurfaceMesh { points, triangles, source: self.source, welded, added_from, edges, census, metric }
     }
 }
 

@@ -1,0 +1,210 @@
+//! Curvature of a triangulated surface, for size fields: a tensor per vertex.
+//!
+//! The curvature measure of an edge with dihedral angle b and length l is b l t t^T, where t is the unit vector
+//! across the edge in the tangent plane (the normal cycle of Cohen-Steiner and Morvan 2003, doi
+//! 10.1145/777792.777839, in the variant whose eigenvectors are the directions of curvature). Half of it goes to
+//! each end; the tensor of a vertex is the measure of the cells of its star over their (mollified) area. Open and
+//! non-manifold edges measure nothing. All numbers are finite.
+
+use crate::mesh::SurfaceMesh;
+use crate::space::{Vec3, cross, dot, norm, sub};
+
+/// Curvatures are cut off here, per diagonal of the bounding box: no mesher resolves radii below.
+const LARGEST: f64 = 1e9;
+
+/// A symmetric tensor: entries xx, yy, zz, xy, yz, zx.
+type Tensor = [f64; 6];
+
+/// Tensor and normal at a point of the surface, in the unit of the metric.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Curvature {
+    tensor: Tensor,
+    normal: Vec3,
+}
+
+/// Largest and smallest principal curvature (by magnitude), each as unit direction times curvature.
+pub type Principal = [Vec3; 2];
+
+impl Curvature {
+    /// Half-way between two points.
+    pub fn between(&self, other: &Self) -> Self {
+        let mean = |k| 0.5 * (self.tensor[k] + other.tensor[k]);
+        let sum = [0, 1, 2].map(|k| self.normal[k] + other.normal[k]);
+        Self { tensor: [mean(0), mean(1), mean(2), mean(3), mean(4), mean(5)], normal: sum }
+    }
+
+    /// The principal curvatures within the tangent plane, for a surface whose lengths are multiplied by `scale`.
+    pub fn principal(&self, scale: f64) -> Principal {
+        let [e, f] = frame(self.normal);
+        let (a, b, c) = (self.along(e, e), self.along(e, f), self.along(f, f));
+        let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
+        let radius = (half * half + b * b).sqrt();
+        // The eigenvector of mean + radius, by the row of the matrix that does not cancel.
+        let v = if half >= 0.0 { [half + radius, b] } else { [b, radius - half] };
+        let length = (v[0] * v[0] + v[1] * v[1]).sqrt();
+        let v = if length > 0.0 { v.map(|x| x / length) } else { [1.0, 0.0] };
+        let in_space = |v: [f64; 2], k: f64| {
+            let k = (k.clamp(-LARGEST, LARGEST) * scale).clamp(f64::MIN, f64::MAX);
+            [0, 1, 2].map(|i| k * (v[0] * e[i] + v[1] * f[i]))
+        };
+        let first = in_space(v, mean + radius);
+        let second = in_space([-v[1], v[0]], mean - radius);
+        if mean >= 0.0 { [first, second] } else { [second, first] }
+    }
+
+    fn along(&self, p: Vec3, q: Vec3) -> f64 {
+        let [xx, yy, zz, xy, yz, zx] = self.tensor;
+        p[0] * (xx * q[0] + xy * q[1] + zx * q[2])
+            + p[1] * (xy * q[0] + yy * q[1] + yz * q[2])
+            + p[2] * (zx * q[0] + yz * q[1] + zz * q[2])
+    }
+}
+
+/// Two unit vectors that make a right-handed frame with the direction of `normal` (Duff and co-workers 2017,
+/// *Building an orthonormal basis, revisited*); those of the z axis where there is none.
+fn frame(normal: Vec3) -> [Vec3; 2] {
+    let length = norm(normal);
+    let [x, y, z] = if length > 0.0 { normal.map(|c| c / length) } else { [0.0, 0.0, 1.0] };
+    let sign = 1.0_f64.copysign(z);
+    let a = -1.0 / (sign + z);
+    let b = x * y * a;
+    [[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]]
+}
+
+/// The curvature at each group of vertices of `mesh` that `group` gives the same number below `groups`: copies of
+/// one vertex in several sheets share theirs.
+pub fn measure(mesh: &SurfaceMesh, group: &[u32], groups: usize) -> Vec<Curvature> {
+    let scale = mesh.metric().scale;
+    let points: Vec<Vec3> = mesh.points().iter().map(|p| p.map(|c| c * scale)).collect();
+    let corners: Vec<[usize; 3]> = mesh.triangles().iter().map(|t| t.map(|v| group[v.index()] as usize)).collect();
+    let normals: Vec<Vec3> = mesh.triangles().iter().map(|t| unit_normal(t.map(|v| points[v.index()]))).collect();
+    let areas: Vec<f64> = mesh.metric().shapes.iter().map(|s| s.area()).collect();
+    let cells = cells(mesh, &points, &normals, &areas, group, groups);
+    let mut stars = vec![(Tensor::default(), 0.0, Vec3::default()); groups];
+    for (face, t) in corners.iter().enumerate() {
+        let (tensor, area) = t.iter().fold((Tensor::default(), 0.0), |sum, v| plus(sum, cells[*v]));
+        for v in t {
+            let star = &mut stars[*v];
+            (star.0, star.1) = plus((star.0, star.1), (tensor, area));
+            (0..3).for_each(|k| star.2[k] += areas[face] * normals[face][k]);
+        }
+    }
+    let finished = |(tensor, area, normal): (Tensor, f64, Vec3)| Curvature {
+        tensor: tensor.map(|x| if area > 0.0 { (x / area).clamp(-LARGEST, LARGEST) } else { 0.0 }),
+        normal,
+    };
+    stars.into_iter().map(finished).collect()
+}
+
+/// Per group, the measure and the area of its cell: half of each edge, a third of each triangle.
+fn cells(
+    mesh: &SurfaceMesh,
+    points: &[Vec3],
+    normals: &[Vec3],
+    areas: &[f64],
+    group: &[u32],
+    groups: usize,
+) -> Vec<(Tensor, f64)> {
+    let mut cells = vec![(Tensor::default(), 0.0); groups];
+    for (t, area) in mesh.triangles().iter().zip(areas) {
+        t.iter().for_each(|v| cells[group[v.index()] as usize].1 += area / 3.0);
+    }
+    for (_, sides) in mesh.edges().iter() {
+        let [g, h] = *sides else { continue };
+        let t = mesh.triangles()[g.face().index()];
+        let ends = [t[g.side()], t[(g.side() + 1) % 3]];
+        let along = sub(points[ends[1].index()], points[ends[0].index()]);
+        let half = edge_measure(along, normals[g.face().index()], normals[h.face().index()]).map(|x| 0.5 * x);
+        for v in ends {
+            let cell = &mut cells[group[v.index()] as usize];
+            *cell = plus(*cell, (half, 0.0));
+        }
+    }
+    cells
+}
+
+/// b l t t^T for an edge between triangles with the given normals.
+fn edge_measure(along: Vec3, left: Vec3, right: Vec3) -> Tensor {
+    let across = cross([0, 1, 2].map(|k| left[k] + right[k]), along);
+    let (length, width) = (norm(along), norm(across));
+    if length == 0.0 || width == 0.0 {
+        return Tensor::default();
+    }
+    let bend = dot(cross(left, right), along) / length;
+    let weight = bend.atan2(dot(left, right)) * length;
+    let [x, y, z] = across.map(|c| c / width);
+    [x * x, y * y, z * z, x * y, y * z, z * x].map(|c| weight * c)
+}
+
+/// The unit normal of a triangle; zero where it has none.
+fn unit_normal(p: [Vec3; 3]) -> Vec3 {
+    let n = cross(sub(p[1], p[0]), sub(p[2], p[0]));
+    let length = norm(n);
+    if length > 0.0 { n.map(|c| c / length) } else { [0.0; 3] }
+}
+
+fn plus(a: (Tensor, f64), b: (Tensor, f64)) -> (Tensor, f64) {
+    let mut sum = a;
+    (0..6).for_each(|k| sum.0[k] += b.0[k]);
+    sum.1 += b.1;
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriangleSoup;
+    use crate::{repair, shapes};
+
+    fn measured(soup: &TriangleSoup) -> (SurfaceMesh, Vec<Principal>) {
+        let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
+        let group: Vec<u32> = (0..mesh.points().len() as u32).collect();
+        let scale = mesh.metric().scale;
+        let all = measure(&mesh, &group, group.len()).iter().map(|c| c.principal(scale)).collect();
+        (mesh, all)
+    }
+
+    #[test]
+    fn a_sphere_has_one_over_its_radius_in_every_direction() {
+        for scale in [1.0, 1e-8, 1e8] {
+            let sphere = shapes::sphere(40);
+            let points = sphere.points().iter().map(|p| p.map(|c| c * 5.0 * scale)).collect();
+            let soup = TriangleSoup::new(points, sphere.triangles().to_vec()).expect("sound");
+            let (mesh, all) = measured(&soup);
+            for (p, [max, min]) in mesh.points().iter().zip(&all) {
+                let (max, min) = (norm(*max) * 5.0 * scale, norm(*min) * 5.0 * scale);
+                assert!(max < 1.25 && min > 0.75 && min <= max, "{max} {min} at {p:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_tube_bends_around_and_not_along() {
+        let (n, m) = (48, 48);
+        let point = |i: u32, j: u32| {
+            let angle = std::f64::consts::TAU * f64::from(i) / f64::from(n);
+            [2.0 * angle.cos(), 2.0 * angle.sin(), 0.2 * f64::from(j)]
+        };
+        let points = (0..n).flat_map(|i| (0..=m).map(move |j| point(i, j))).collect();
+        let at = |i: u32, j: u32| (i % n) * (m + 1) + j;
+        let squares = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
+        let halves = squares.flat_map(|(i, j)| {
+            [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+        });
+        let (mesh, all) = measured(&TriangleSoup::new(points, halves.collect()).expect("sound"));
+        for (p, [max, min]) in mesh.points().iter().zip(&all).filter(|(p, _)| p[2] > 1.0 && p[2] < 8.0) {
+            assert!((norm(*max) - 0.5).abs() < 0.01 && norm(*min) < 0.01, "{max:?} {min:?}");
+            let around = (p[0] * max[1] - p[1] * max[0]).abs() / (norm(*max) * 2.0);
+            assert!(around > 0.999, "{max:?} at {p:?}");
+        }
+    }
+
+    #[test]
+    fn slivers_and_flat_triangles_keep_everything_finite() {
+        for soup in [shapes::sliver_strip(12), shapes::folding_three(), shapes::book(3, 3)] {
+            let (_, all) = measured(&soup);
+            assert!(all.iter().flatten().flatten().all(|c| c.is_finite()));
+        }
+        assert!(Curvature::default().principal(1.0) == [[0.0; 3]; 2]);
+    }
+}

@@ -1,0 +1,79 @@
+//! Feature edges: where the surface has a crease, so that a seam belongs there.
+//!
+//! An edge may be a feature where its dihedral angle exceeds a threshold, and joins others down to a lower one
+//! (hysteresis). Noise makes such edges, too: slivers have any normal. So the angle is measured again between the mean
+//! normals of the triangles around, weighted by area, on either side: sides that meet around the ends of the edge
+//! within a few triangles are the same side. Chains that are short all told are dropped.
+
+use super::dual::Dual;
+use crate::id::HalfEdgeId;
+use crate::space::{Vec3, dot, norm};
+use crate::union_find::UnionFind;
+
+/// The lower threshold, as a share of the upper one: 25 of 40 degrees.
+const LOWER: f64 = 0.625;
+
+/// The triangles that make up a side of an edge.
+const SIDE: usize = 12;
+
+/// The least length of connected features, as a share of the size of the surface (the square root of its area).
+const LEAST_LENGTH: f64 = 0.03;
+
+/// Marks the feature edges of `dual`: dihedral angle above `angle` degrees. Returns their number.
+pub(super) fn mark_features(dual: &mut Dual, angle: f64) -> usize {
+    let cos = |degrees: f64| degrees.to_radians().cos();
+    let (sharp, blunt) = (cos(angle), cos(LOWER * angle));
+    let normals: Vec<Vec3> = (0..dual.mesh.triangles().len()).map(|f| dual.area_vector(f)).collect();
+    let pairs = dual.half_edges().filter_map(|h| Some((h, dual.across(h)?))).filter(|(h, t)| h < t);
+    let bent = |(h, t): &(HalfEdgeId, HalfEdgeId)| is_bent(normals[h.face().index()], normals[t.face().index()], blunt);
+    let candidates: Vec<_> = pairs.filter(bent).collect();
+    let mut candidate = vec![false; dual.mesh.edges().len()];
+    candidates.iter().for_each(|(h, _)| candidate[dual.mesh.edges().edge(*h).index()] = true);
+    let sides = |(h, t): &(HalfEdgeId, HalfEdgeId)| {
+        [side(dual, &normals, &candidate, *h), side(dual, &normals, &candidate, *t)]
+    };
+    let measured: Vec<_> =
+        candidates.iter().map(|c| (c.0, sides(c))).filter(|(_, [m, n])| is_bent(*m, *n, blunt)).collect();
+    let strong: Vec<bool> = measured.iter().map(|(_, [m, n])| is_bent(*m, *n, sharp)).collect();
+    let kept = long_enough(dual, &measured.iter().map(|m| m.0).collect::<Vec<_>>(), &strong);
+    kept.iter().for_each(|h| dual.feature[dual.mesh.edges().edge(*h).index()] = true);
+    kept.len()
+}
+
+/// Whether two normals (of any length) differ by more than the angle with this cosine.
+fn is_bent(m: Vec3, n: Vec3, cos: f64) -> bool {
+    dot(m, n) < cos * norm(m) * norm(n)
+}
+
+/// The sum of the area vectors on the side of `h`: its triangle and the next few that can be reached without crossing
+/// a candidate.
+fn side(dual: &Dual, normals: &[Vec3], candidate: &[bool], h: HalfEdgeId) -> Vec3 {
+    let mut faces = vec![h.face()];
+    let mut next = 0;
+    while next < faces.len() && faces.len() < SIDE {
+        let face = faces[next];
+        next += 1;
+        for e in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
+            let Some(t) = dual.across(e).filter(|_| !candidate[dual.mesh.edges().edge(e).index()]) else { continue };
+            if !faces.contains(&t.face()) {
+                faces.push(t.face());
+            }
+        }
+    }
+    faces.iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + normals[f.index()][k]))
+}
+
+/// Those of the edges whose connected strong ones are long enough together.
+fn long_enough(dual: &Dual, edges: &[HalfEdgeId], strong: &[bool]) -> Vec<HalfEdgeId> {
+    let mut sets = UnionFind::new(dual.mesh.points().len());
+    edges.iter().for_each(|h| {
+        sets.unite(dual.from(*h), dual.to(*h));
+    });
+    let mut lengths = vec![0.0; dual.mesh.points().len()];
+    for (h, _) in edges.iter().zip(strong).filter(|(_, s)| **s) {
+        lengths[sets.find(dual.from(*h))] += dual.length(*h);
+    }
+    let area: f64 = (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum();
+    let least = LEAST_LENGTH * area.sqrt();
+    edges.iter().copied().filter(|h| lengths[sets.find(dual.from(*h))] >= least).collect()
+}

@@ -1,0 +1,181 @@
+//! How close different seams of a chart come to each other.
+
+use super::{Curve, SeamNetwork};
+use crate::id::ChartId;
+use crate::mesh::SurfaceMesh;
+use crate::space::{BoundingBox, Vec3, dot, sub};
+
+impl SeamNetwork {
+    /// The shortest distance in space between two seams beside one chart that share no end, in the unit of the
+    /// input; `None` where there are no two. Seams that meet in a corner are not compared: they come as close as
+    /// one likes.
+    ///
+    /// A search of pairs of polylines, halved again and again, for the closest pair of segments (branch and bound on
+    /// boxes around their halves).
+    pub fn shortest_distance(&self, mesh: &SurfaceMesh) -> Option<f64> {
+        let scale = mesh.metric().scale;
+        let place = |v: &crate::id::VertexId| mesh.points()[v.index()].map(|c| c * scale);
+        let polyline = |c: &Curve| Polyline::new(c.vertices().iter().map(place).collect());
+        let polylines: Vec<Polyline> = self.curves().iter().map(polyline).collect();
+        let mut squared = f64::INFINITY;
+        for (i, j) in self.comparable_pairs() {
+            closest(&polylines[i], &polylines[j], &mut squared);
+        }
+        squared.is_finite().then(|| squared.sqrt() / scale)
+    }
+
+    /// Pairs of seams beside a chart that share no end.
+    fn comparable_pairs(&self) -> Vec<(usize, usize)> {
+        let mut pairs = Vec::new();
+        for chart in (0..self.loops.len()).map(ChartId::at) {
+            let mut seams: Vec<usize> = self.loops(chart).iter().flatten().map(|p| p.curve.index()).collect();
+            seams.retain(|c| !self.curves[*c].is_open());
+            seams.sort_unstable();
+            seams.dedup();
+            let apart = |i: usize, j: usize| !self.curves[i].ends.iter().any(|e| self.curves[j].ends.contains(e));
+            for (k, i) in seams.iter().enumerate() {
+                pairs.extend(seams[k + 1..].iter().filter(|j| apart(*i, **j)).map(|j| (*i, *j)));
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs
+    }
+}
+
+/// A polyline with boxes around it, its halves, their halves and so on.
+struct Polyline {
+    points: Vec<Vec3>,
+    /// The box of the segments `first..end`, by the position that [`Range`] gives it.
+    boxes: Vec<BoundingBox>,
+}
+
+/// Segments of a polyline, and the position of their box: that of the halves of box `i` is `2 i + 1` and `2 i + 2`.
+#[derive(Clone, Copy)]
+struct Range {
+    first: usize,
+    end: usize,
+    at: usize,
+}
+
+impl Range {
+    fn halves(self) -> [Self; 2] {
+        let middle = self.first.midpoint(self.end);
+        [Self { end: middle, at: 2 * self.at + 1, ..self }, Self { first: middle, at: 2 * self.at + 2, ..self }]
+    }
+
+    fn len(self) -> usize {
+        self.end - self.first
+    }
+}
+
+impl Polyline {
+    fn new(points: Vec<Vec3>) -> Self {
+        let whole = Range { first: 0, end: points.len() - 1, at: 0 };
+        let empty = BoundingBox { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+        let mut line = Self { boxes: vec![empty; 4 * whole.len()], points };
+        line.fill(whole);
+        line
+    }
+
+    fn whole(&self) -> Range {
+        Range { first: 0, end: self.points.len() - 1, at: 0 }
+    }
+
+    /// As deep as the logarithm of the number of segments.
+    fn fill(&mut self, range: Range) -> BoundingBox {
+        let found = if range.len() > 1 {
+            let [a, b] = range.halves().map(|half| self.fill(half));
+            BoundingBox::of([a.min, a.max, b.min, b.max])
+        } else {
+            BoundingBox::of(self.points[range.first..=range.end].iter().copied())
+        };
+        self.boxes[range.at] = found.unwrap_or(self.boxes[range.at]);
+        self.boxes[range.at]
+    }
+}
+
+/// Lowers `squared` to the squared distance of two polylines, if that is less. Every step halves one of two ranges,
+/// so the stack is never longer than the number of halvings.
+fn closest(a: &Polyline, b: &Polyline, squared: &mut f64) {
+    let mut open = vec![(a.whole(), b.whole())];
+    while let Some((r, s)) = open.pop() {
+        if gap(&a.boxes[r.at], &b.boxes[s.at]) >= *squared {
+            continue;
+        }
+        if r.len() == 1 && s.len() == 1 {
+            let (p, q) = (&a.points[r.first..], &b.points[s.first..]);
+            *squared = squared.min(segment_distance([p[0], p[1]], [q[0], q[1]]));
+            continue;
+        }
+        let mut next = if r.len() >= s.len() { r.halves().map(|h| (h, s)) } else { s.halves().map(|h| (r, h)) };
+        // The nearer half is looked at first.
+        let distance = |(r, s): &(Range, Range)| gap(&a.boxes[r.at], &b.boxes[s.at]);
+        if distance(&next[0]) < distance(&next[1]) {
+            next.swap(0, 1);
+        }
+        open.extend(next);
+    }
+}
+
+/// The squared distance of two boxes.
+fn gap(a: &BoundingBox, b: &BoundingBox) -> f64 {
+    let along = |k: usize| (a.min[k] - b.max[k]).max(b.min[k] - a.max[k]).max(0.0);
+    (0..3).map(|k| along(k) * along(k)).sum()
+}
+
+/// The squared distance of two segments (Ericson 2005, *Real-time collision detection*, section 5.1.9).
+fn segment_distance(p: [Vec3; 2], q: [Vec3; 2]) -> f64 {
+    let (d, e, r) = (sub(p[1], p[0]), sub(q[1], q[0]), sub(p[0], q[0]));
+    let (dd, ee, de) = (dot(d, d), dot(e, e), dot(d, e));
+    let (dr, er) = (dot(d, r), dot(e, r));
+    let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).clamp(0.0, 1.0) } else { 0.0 };
+    let s = ratio(de * er - dr * ee, dd * ee - de * de);
+    let t = ratio(de * s + er, ee);
+    let s = ratio(de * t - dr, dd);
+    let gap = [0, 1, 2].map(|k| r[k] + s * d[k] - t * e[k]);
+    dot(gap, gap)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seams::tests::{labelled, sector};
+    use crate::shapes;
+
+    #[test]
+    fn bands_of_a_tube_are_as_far_apart_as_their_seams() {
+        // Circles in the planes through the axis of the torus: closest where its tube is innermost, at 0.6.
+        let (mesh, atlas) = labelled(&shapes::ring_torus(24, 12), |p| sector(p, 4));
+        let network = SeamNetwork::new(&mesh, atlas.charts());
+        let expected = 0.6 * 2.0_f64.sqrt();
+        assert!((network.shortest_distance(&mesh).expect("seams") - expected).abs() < 1e-12);
+        // Brute force over all pairs of segments agrees.
+        let places: Vec<Vec<Vec3>> =
+            network.curves().iter().map(|c| c.vertices().iter().map(|v| mesh.points()[v.index()]).collect()).collect();
+        let mut least = f64::INFINITY;
+        for (i, j) in network.comparable_pairs() {
+            for (p, q) in places[i].windows(2).flat_map(|p| places[j].windows(2).map(move |q| (p, q))) {
+                least = least.min(segment_distance([p[0], p[1]], [q[0], q[1]]).sqrt());
+            }
+        }
+        assert!((least - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn one_seam_and_seams_that_meet_have_no_distance() {
+        for (soup, count) in [(shapes::sphere(8), 3), (shapes::disk(5), 2), (shapes::disk(5), 1)] {
+            let (mesh, atlas) = labelled(&soup, |p| sector(p, count));
+            assert_eq!(SeamNetwork::new(&mesh, atlas.charts()).shortest_distance(&mesh), None);
+        }
+    }
+
+    #[test]
+    fn segments_cross_run_side_by_side_and_end() {
+        let x = [[0.0; 3], [2.0, 0.0, 0.0]];
+        assert_eq!(segment_distance(x, [[1.0, -1.0, 1.0], [1.0, 1.0, 1.0]]), 1.0);
+        assert_eq!(segment_distance(x, [[0.5, 3.0, 0.0], [9.0, 3.0, 0.0]]), 9.0);
+        assert_eq!(segment_distance(x, [[4.0, 0.0, 0.0], [5.0, 7.0, 0.0]]), 4.0);
+        assert_eq!(segment_distance(x, [[1.0, 2.0, 0.0]; 2]), 4.0);
+    }
+}

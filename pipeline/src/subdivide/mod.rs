@@ -1,0 +1,250 @@
+//! Subdivide: certified quadratic maps -> a linear triangulation that a mesher can remesh through.
+//!
+//! Every curved triangle becomes four straight ones between its six nodes; in space, mid-edge nodes lie in the
+//! middle of straight edges. A curved triangle can be valid although one of the four is not: there it is refined
+//! until all are positive, decided exactly on the numbers that are kept. Where that would take too many
+//! parts (a curved triangle may be valid by a hair along a whole side) the chart is handed over by the map from which
+//! its untangling started: it is certified too, and its triangles are straight. Nodes on seams are the same numbers in
+//! all charts, and a curve is exactly the sides of the triangles along it: nothing cracks or overlaps.
+//!
+//! Meshers compute normals from the numbers as written and fail where one is exactly zero: in this copy, and only
+//! here, such a triangle has one node moved by 1e-12 of the bounding box.
+//!
+//! A [`LinearAtlas`] can only be made from certified maps.
+
+mod nodes;
+mod normals;
+mod refine;
+
+use crate::CertifiedChart;
+use crate::atlas::Chart;
+use crate::certify::CertifiedMap;
+use crate::curvature::Principal;
+use crate::grid::{GridPoint, orientation};
+use crate::id::{ChartId, CurveId, FaceId, VertexId};
+use crate::mesh::SurfaceMesh;
+use crate::seams::SeamNetwork;
+use crate::space::Vec3;
+use nodes::Nodes;
+
+/// The charts of a surface as linear triangulations that share the nodes on their seams.
+#[derive(Clone, Debug)]
+pub struct LinearAtlas {
+    points: Vec<Vec3>,
+    curvatures: Vec<Principal>,
+    charts: Vec<LinearChart>,
+    curves: Vec<Vec<u32>>,
+    linear: Vec<ChartId>,
+    refined: usize,
+    moved: usize,
+}
+
+/// One chart: a triangulation in space and in the plane.
+#[derive(Clone, Debug, Default)]
+pub struct LinearChart {
+    nodes: Vec<u32>,
+    uv: Vec<GridPoint>,
+    triangles: Vec<[u32; 3]>,
+    faces: Vec<u32>,
+}
+
+/// Why charts cannot be handed over as linear triangulations.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// A chart lies on both sides of a curve: meshers cannot tell its two images in the plane apart.
+    #[error("chart {chart} lies on both sides of curve {curve}")]
+    MeetsItself {
+        /// The chart.
+        chart: ChartId,
+        /// The curve.
+        curve: CurveId,
+    },
+    /// The boundary of a chart passes a point twice: meshers cannot tell its two images in the plane apart.
+    #[error("the boundary of chart {chart} passes twice through the place of vertex {vertex}")]
+    Pinched {
+        /// The chart.
+        chart: ChartId,
+        /// A vertex of the surface there.
+        vertex: VertexId,
+    },
+    /// Straight parts of a curved triangle stay inverted, in the quadratic and in the linear map.
+    #[error(transparent)]
+    Inverted(#[from] Inverted),
+    /// A triangle has no normal in doubles, wherever its nodes move.
+    #[error("triangle {face} of chart {chart} has no normal in double precision: its size is beyond it")]
+    NoNormal {
+        /// The chart.
+        chart: ChartId,
+        /// The triangle, numbered within the chart.
+        face: FaceId,
+    },
+}
+
+/// A triangle whose straight parts are inverted as far as it may be refined.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("triangle {face} of chart {chart} has inverted straight parts after {depth} halvings, {halved} in its chart")]
+pub struct Inverted {
+    /// The chart.
+    pub chart: ChartId,
+    /// The triangle, numbered within the chart.
+    pub face: FaceId,
+    /// How often it was halved.
+    pub depth: u32,
+    /// How many parts of edges were halved for the chart.
+    pub halved: usize,
+}
+
+impl LinearAtlas {
+    /// The positions of the nodes that charts share, and of others that none uses.
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// The largest and smallest principal curvature at each node.
+    pub fn curvatures(&self) -> &[Principal] {
+        &self.curvatures
+    }
+
+    /// The charts, in the order of their ids.
+    pub fn charts(&self) -> &[LinearChart] {
+        &self.charts
+    }
+
+    /// The nodes along each curve of the network, from begin to end.
+    pub fn curves(&self) -> &[Vec<u32>] {
+        &self.curves
+    }
+
+    /// The number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.charts.iter().map(|c| c.triangles.len()).sum()
+    }
+
+    /// The charts that are handed over by their linear map.
+    pub fn linear_charts(&self) -> &[ChartId] {
+        &self.linear
+    }
+
+    /// How many triangles were split into other than four.
+    pub fn refined(&self) -> usize {
+        self.refined
+    }
+
+    /// How many nodes were moved so that every triangle has a normal.
+    pub fn moved(&self) -> usize {
+        self.moved
+    }
+}
+
+impl LinearChart {
+    /// Per node of the chart, the node of the atlas.
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes
+    }
+
+    /// Per node of the chart, its place in the plane.
+    pub fn uv(&self) -> &[GridPoint] {
+        &self.uv
+    }
+
+    /// The triangles, by nodes of the chart, all turning left in the plane.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    fn turns_left(&self, t: [u32; 3]) -> bool {
+        let [a, b, c] = t.map(|n| self.uv[n as usize]);
+        orientation(a, b, c) > 0
+    }
+}
+
+/// Turns `maps`, those of `charts`, in order, into linear triangulations.
+///
+/// # Errors
+/// [`Error`]: this surface cannot be handed over in this form; the maps are none the worse.
+///
+/// # Panics
+/// If `maps` and `network` are not those of `charts`.
+pub fn subdivide(
+    mesh: &SurfaceMesh,
+    charts: &[Chart],
+    maps: &[CertifiedChart],
+    network: &SeamNetwork,
+) -> Result<LinearAtlas, Error> {
+    assert_eq!(charts.len(), maps.len(), "a map for every chart");
+    refuse_self_contact(network, charts.len())?;
+    let split = split(mesh, charts, maps, network)?;
+    let Split { nodes, charts, linear, refined } = split;
+    let mut points = nodes.positions(mesh);
+    let moved = normals::separate(&mut points, &charts, mesh.bounding_box().diagonal())?;
+    let curves = network.curves().iter().map(|c| nodes.along(c)).collect();
+    Ok(LinearAtlas { curvatures: nodes.curvatures(mesh), points, charts, curves, linear, refined, moved })
+}
+
+/// Charts whose triangles all turn left, and how they came about.
+struct Split {
+    nodes: Nodes,
+    charts: Vec<LinearChart>,
+    linear: Vec<ChartId>,
+    refined: usize,
+}
+
+/// Splits the triangles of all charts. A chart that needs too many parts gets its linear map, and all begins again:
+/// at most once for each chart.
+fn split(mesh: &SurfaceMesh, charts: &[Chart], maps: &[CertifiedChart], network: &SeamNetwork) -> Result<Split, Error> {
+    let mut chosen: Vec<&CertifiedMap> = maps.iter().map(|m| &m.certified).collect();
+    let mut linear: Vec<ChartId> = Vec::new();
+    loop {
+        let mut nodes = Nodes::new(mesh, network, charts);
+        let mut split: Vec<LinearChart> =
+            charts.iter().zip(&chosen).map(|(c, m)| quartered(mesh, c, m, &nodes)).collect();
+        let failed = match refine::refine(refine::DEPTH, mesh, charts, &chosen, &mut nodes, &mut split) {
+            Ok(refined) => {
+                linear.sort_unstable();
+                return Ok(Split { nodes, charts: split, linear, refined });
+            }
+            Err(failed) => failed,
+        };
+        for inverted in failed {
+            if linear.contains(&inverted.chart) {
+                return Err(inverted.into());
+            }
+            chosen[inverted.chart.index()] = &maps[inverted.chart.index()].start;
+            linear.push(inverted.chart);
+        }
+    }
+}
+
+/// Refuses charts whose boundary touches itself in space: a place on it has two images in the plane.
+fn refuse_self_contact(network: &SeamNetwork, charts: usize) -> Result<(), Error> {
+    for curve in network.curves() {
+        if let Some(twice) = curve.sides().windows(2).find(|w| w[0].chart == w[1].chart) {
+            return Err(Error::MeetsItself { chart: twice[0].chart, curve: curve.id() });
+        }
+    }
+    for chart in (0..charts).map(ChartId::at) {
+        let begin = |p: &crate::seams::Passage| network.curves()[p.curve.index()].ends()[usize::from(!p.forward)];
+        let mut passed: Vec<usize> = network.loops(chart).iter().flatten().map(begin).collect();
+        passed.sort_unstable();
+        if let Some(twice) = passed.windows(2).find(|w| w[0] == w[1]) {
+            return Err(Error::Pinched { chart, vertex: network.points()[twice[0]].vertex });
+        }
+    }
+    Ok(())
+}
+
+/// Every triangle split into four, between corners and mid-edge nodes.
+fn quartered(mesh: &SurfaceMesh, chart: &Chart, map: &CertifiedMap, nodes: &Nodes) -> LinearChart {
+    let map = map.map();
+    assert_eq!(map.nodes.len(), chart.vertices().len() + chart.edges().len(), "the map of this chart");
+    let parts = |[a, b, c, ab, bc, ca]: [u32; 6]| [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+    LinearChart {
+        nodes: nodes.of_chart(mesh, chart),
+        uv: map.nodes.clone(),
+        triangles: map.cells.iter().flat_map(|c| parts(*c)).collect(),
+        faces: (0..map.cells.len() as u32).flat_map(|f| [f; 4]).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,212 @@
+use super::*;
+use crate::atlas::Atlas;
+use crate::certify::{PlanarMap, prove};
+use crate::mesh::TriangleSoup;
+use crate::seams::tests::{labelled, sector};
+use crate::space::distance;
+use crate::{Order, finish_chart, map_chart, shapes};
+
+/// A surface with one chart per label, and their maps.
+struct Sample {
+    mesh: SurfaceMesh,
+    atlas: Atlas,
+    maps: Vec<CertifiedChart>,
+    network: SeamNetwork,
+}
+
+impl Sample {
+    fn new(soup: &TriangleSoup, label: impl Fn(Vec3) -> u32) -> Self {
+        let (mesh, atlas) = labelled(soup, label);
+        let certified = |c| finish_chart(map_chart(c, Order::Quadratic).expect("maps"));
+        let maps = atlas.charts().iter().map(certified).collect();
+        let network = SeamNetwork::new(&mesh, atlas.charts());
+        Self { mesh, atlas, maps, network }
+    }
+
+    fn subdivide(&self) -> Result<LinearAtlas, Error> {
+        subdivide(&self.mesh, self.atlas.charts(), &self.maps, &self.network)
+    }
+
+    /// Subdivides, and looks at all that is promised.
+    fn verified(&self) -> LinearAtlas {
+        let linear = self.subdivide().expect("subdivides");
+        for (chart, c) in linear.charts().iter().zip(self.atlas.charts()) {
+            assert!(chart.triangles().iter().all(|t| chart.turns_left(*t)), "every triangle turns left");
+            assert!(chart.uv().iter().all(|p| GridPoint::exact(p.uv()) == Some(*p)), "places are doubles");
+            assert_eq!(self.open_sides(chart), self.sides_of_curves(&linear, c), "boundaries are the curves");
+        }
+        self.verify_curves(&linear);
+        linear
+    }
+
+    /// The sides of a chart's triangles that have no twin, as nodes of the atlas; twins run in opposite directions.
+    fn open_sides(&self, chart: &LinearChart) -> Vec<(u32, u32)> {
+        let sides = chart.triangles().iter().flat_map(|t| [0, 1, 2].map(|k| [t[k], t[(k + 1) % 3]]));
+        let mut sides: Vec<(u32, u32)> =
+            sides.map(|s| s.map(|n| chart.nodes()[n as usize])).map(|[a, b]| (a, b)).collect();
+        sides.sort_unstable();
+        assert!(sides.is_sorted_by(|a, b| a < b), "no side is there twice");
+        let open = |s: &&(u32, u32)| sides.binary_search(&(s.1, s.0)).is_err();
+        sides.iter().filter(open).copied().collect()
+    }
+
+    fn sides_of_curves(&self, linear: &LinearAtlas, chart: &Chart) -> Vec<(u32, u32)> {
+        let mut sides = Vec::new();
+        for passage in self.network.loops(chart.id()).iter().flatten() {
+            let along = linear.curves()[passage.curve.index()].windows(2).map(|w| (w[0], w[1]));
+            sides.extend(along.map(|(a, b)| if passage.forward { (a, b) } else { (b, a) }));
+        }
+        sides.sort_unstable();
+        sides
+    }
+
+    fn verify_curves(&self, linear: &LinearAtlas) {
+        for (curve, nodes) in self.network.curves().iter().zip(linear.curves()) {
+            assert_eq!(curve.is_closed(), nodes[0] == nodes[nodes.len() - 1]);
+            let points: Vec<Vec3> = nodes.iter().map(|n| linear.points()[*n as usize]).collect();
+            let length: f64 = points.windows(2).map(|w| distance(w[0], w[1])).sum();
+            assert!((length / curve.length() - 1.0).abs() < 1e-9, "nodes lie in order along the curve");
+        }
+    }
+}
+
+#[test]
+fn charts_become_triangulations_that_share_their_seams() {
+    let above = |p: Vec3| u32::from(p[2] > 0.0);
+    let page = |p: Vec3| {
+        let turn = p[1].atan2(p[0]) - 0.4 * p[0].hypot(p[1]);
+        ((turn / std::f64::consts::TAU * 3.0).rem_euclid(3.0).round() as u32) % 3
+    };
+    let samples = [
+        Sample::new(&shapes::sphere(10), above),
+        Sample::new(&shapes::sphere(10), |p| sector(p, 3)),
+        Sample::new(&shapes::ring_torus(16, 10), |p| sector(p, 2)),
+        Sample::new(&shapes::book(3, 5), page),
+        Sample::new(&shapes::disk_with_holes(13, 2), |_| 0),
+        Sample::new(&shapes::bent_disk(24, 0.2, 0.2), |p| sector(p, 2)),
+    ];
+    for sample in samples {
+        let linear = sample.verified();
+        assert!(linear.triangle_count() >= 4 * sample.mesh.triangles().len());
+        assert_eq!((linear.moved(), linear.linear_charts()), (0, &[][..]));
+    }
+}
+
+#[test]
+fn a_chart_that_needs_too_many_parts_is_handed_over_by_its_linear_map() {
+    // Untangled against all odds: dozens of triangles are valid by a hair along whole sides.
+    let sample = Sample::new(&shapes::bent_disk(12, 0.45, 1.0), |p| sector(p, 2));
+    let linear = sample.verified();
+    assert!(linear.linear_charts().contains(&ChartId(0)), "{:?}", linear.linear_charts());
+    assert!(linear.triangle_count() < 8 * sample.mesh.triangles().len());
+}
+
+/// A valid curved triangle whose straight part between its third corner and the middles beside it is inverted: the
+/// chord to the middle of the second side passes on the other side of that of the third. In sixteenths.
+const INVERTED: [[f64; 2]; 6] = [[-14.0, -1.0], [5.0, -1.0], [-7.0, 4.0], [1.0, -14.0], [-2.0, 15.0], [-8.0, 2.0]];
+
+/// The map of a chart of one triangle with its nodes at [`INVERTED`].
+fn inverted(chart: &Chart) -> CertifiedMap {
+    let t = chart.triangles()[0].map(|v| v.0);
+    let cells = vec![[t[0], t[1], t[2], 3, 4, 5]];
+    let mut nodes = vec![GridPoint::default(); 6];
+    let places = INVERTED.map(|p| GridPoint::vertex(p.map(|c| c / 16.0)));
+    cells[0].iter().zip(places).for_each(|(n, p)| nodes[*n as usize] = p);
+    prove(PlanarMap { cells, nodes, hole_centres: vec![] }).expect("valid")
+}
+
+/// Every side of a tetrahedron is a chart of its own, mapped like [`inverted`] where asked for.
+fn tetrahedron(is_inverted: [bool; 4]) -> Sample {
+    let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    let number = |p: Vec3| {
+        let zero = (0..3).find(|k| p[*k] == 0.0);
+        zero.map_or(2, |k| [3, 1, 0][k])
+    };
+    let mut sample = Sample::new(&TriangleSoup::new(points, triangles).expect("sound"), number);
+    for (chart, map) in sample.atlas.charts().iter().zip(&mut sample.maps) {
+        if is_inverted[chart.id().index()] {
+            map.certified = inverted(chart);
+        }
+    }
+    sample
+}
+
+#[test]
+fn inverted_parts_are_refined_in_all_charts_around() {
+    let sound = tetrahedron([false; 4]).verified();
+    assert_eq!((sound.refined(), sound.triangle_count()), (0, 16));
+    let parts = quartered_inverted_parts(&tetrahedron([true, false, false, false]));
+    assert_eq!(parts, 1, "the twin is broken where it should be");
+    let one = tetrahedron([true, false, false, false]).verified();
+    assert!(one.refined() > 1 && one.triangle_count() > 20, "neighbours take part: {}", one.refined());
+    let all = tetrahedron([true; 4]).verified();
+    assert_eq!(all.refined(), 4);
+    assert_eq!(all.points().iter().flatten().filter(|c| !c.is_finite()).count(), 0);
+}
+
+/// How many parts of the first chart are inverted when every triangle is split into four.
+fn quartered_inverted_parts(sample: &Sample) -> usize {
+    let nodes = Nodes::new(&sample.mesh, &sample.network, sample.atlas.charts());
+    let chart = quartered(&sample.mesh, &sample.atlas.charts()[0], &sample.maps[0].certified, &nodes);
+    chart.triangles.iter().filter(|t| !chart.turns_left(**t)).count()
+}
+
+#[test]
+fn refinement_that_may_not_go_deep_enough_names_the_triangle() {
+    let sample = tetrahedron([false, true, false, false]);
+    let charts = sample.atlas.charts();
+    let maps: Vec<&CertifiedMap> = sample.maps.iter().map(|m| &m.certified).collect();
+    let mut nodes = Nodes::new(&sample.mesh, &sample.network, charts);
+    let mut linear: Vec<LinearChart> =
+        charts.iter().zip(&maps).map(|(c, m)| quartered(&sample.mesh, c, m, &nodes)).collect();
+    let found = refine::refine(0, &sample.mesh, charts, &maps, &mut nodes, &mut linear);
+    assert_eq!(found, Err(vec![Inverted { chart: ChartId(1), face: FaceId(0), depth: 1, halved: 0 }]));
+}
+
+#[test]
+fn triangles_without_a_normal_get_one_and_others_stay() {
+    let strip = Sample::new(&shapes::sliver_strip(12), |_| 0);
+    let linear = strip.verified();
+    assert!(linear.moved() > 0, "the last triangles of the strip are exactly flat");
+    let corners = |c: &LinearChart, t: [u32; 3]| t.map(|n| linear.points()[c.nodes()[n as usize] as usize]);
+    for chart in linear.charts() {
+        assert!(chart.triangles().iter().all(|t| crate::space::triangle_area(corners(chart, *t)) > 0.0));
+    }
+    let furthest = strip.mesh.points().iter().zip(linear.points()).map(|(p, q)| distance(*p, *q)).fold(0.0, f64::max);
+    assert!(furthest <= 32.0 * 1e-12 * strip.mesh.bounding_box().diagonal(), "{furthest}");
+    // The same strip with its last triangles lifted has nothing to move.
+    let lifted: Vec<Vec3> =
+        shapes::sliver_strip(12).points().iter().map(|p| [p[0], p[1], p[0].fract() * (1.0 + p[0])]).collect();
+    let soup = TriangleSoup::new(lifted, shapes::sliver_strip(12).triangles().to_vec()).expect("sound");
+    assert_eq!(Sample::new(&soup, |_| 0).verified().moved(), 0);
+}
+
+#[test]
+fn triangles_too_small_for_normals_are_named() {
+    let points = shapes::disk(3).points().iter().map(|p| p.map(|c| c * 1e-90)).collect();
+    let soup = TriangleSoup::new(points, shapes::disk(3).triangles().to_vec()).expect("sound");
+    assert!(matches!(Sample::new(&soup, |_| 0).subdivide(), Err(Error::NoNormal { chart: ChartId(0), .. })));
+}
+
+#[test]
+fn a_moved_node_is_moved_far_from_the_origin_too() {
+    let mut points = vec![[1e7, 1e7, 1e7], [1e7 + 1.0, 1e7, 1e7], [1e7 + 0.5, 1e7, 1e7]];
+    let chart = LinearChart { nodes: vec![0, 1, 2], triangles: vec![[0, 1, 2]], faces: vec![0], ..Default::default() };
+    assert_eq!(normals::separate(&mut points, &[chart], 1.0), Ok(1));
+    assert!(crate::space::triangle_area([points[0], points[1], points[2]]) > 0.0);
+}
+
+#[test]
+fn charts_that_touch_themselves_are_refused() {
+    let cut = Sample::new(&crate::seams::tests::cut_cylinder(), |p| u32::from(p[0].hypot(p[1]) > 1.0));
+    assert!(matches!(cut.subdivide(), Err(Error::MeetsItself { chart: ChartId(0), .. })));
+    // A ring of squares with a slit that two corners close again: there the boundary passes twice.
+    let squares = [[1, 0], [2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [0, 1]];
+    let at = |i: u32, j: u32| 4 * i + j;
+    let triangles =
+        |[i, j]: [u32; 2]| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
+    let points = (0..16).map(|k| [f64::from(k / 4), f64::from(k % 4), 0.1 * f64::from(k % 3)]).collect();
+    let soup = TriangleSoup::new(points, squares.into_iter().flat_map(triangles).collect()).expect("sound");
+    assert!(matches!(Sample::new(&soup, |_| 0).subdivide(), Err(Error::Pinched { chart: ChartId(0), .. })));
+}

@@ -1,0 +1,108 @@
+//! Gmsh: `atlas.msh`, through whose maps Gmsh remeshes, and `remesh.geo`, which tells it to.
+//!
+//! The encoders take a [`LinearAtlas`], which can only be made from certified maps.
+
+mod binary;
+mod geo;
+
+pub use geo::{Script, remesh};
+
+use binary::Binary;
+use pipeline::id::ChartId;
+use pipeline::seams::SeamNetwork;
+use pipeline::space::BoundingBox;
+use pipeline::subdivide::{LinearAtlas, LinearChart};
+
+/// The name of the atlas in a result folder, and in `remesh.geo`.
+pub const ATLAS: &str = "atlas.msh";
+
+/// The name of the script.
+pub const REMESH: &str = "remesh.geo";
+
+/// The bytes of `atlas.msh`: MSH 4.1, binary, little endian.
+///
+/// `$Entities` holds the boundary representation: a point for every end of a curve, the curves of `network`, a
+/// surface per chart. `$Parametrizations` holds the curves as polylines and the charts as triangulations in space
+/// and in the plane; see docs/gmsh.md for what Gmsh asks of it. Tags are positions plus one.
+pub fn atlas(linear: &LinearAtlas, network: &SeamNetwork) -> Vec<u8> {
+    let mut out = Binary::new();
+    out.section("Entities", |out| entities(out, linear, network));
+    out.section("Parametrizations", |out| parametrizations(out, linear));
+    out.bytes
+}
+
+fn entities(out: &mut Binary, linear: &LinearAtlas, network: &SeamNetwork) {
+    for count in [network.points().len(), network.curves().len(), linear.charts().len(), 0] {
+        out.size(count);
+    }
+    for (point, node) in point_nodes(linear, network).into_iter().enumerate() {
+        out.tag(point);
+        out.doubles(&linear.points()[node as usize]);
+        out.size(0);
+    }
+    for (curve, nodes) in network.curves().iter().zip(linear.curves()) {
+        out.tag(curve.id().index());
+        bounding_box(out, linear, nodes);
+        // A closed curve names its only point twice: as its begin and as its end.
+        out.size(2);
+        let [begin, end] = curve.ends();
+        out.signed_tag(begin, true);
+        out.signed_tag(end, false);
+    }
+    for (index, chart) in linear.charts().iter().enumerate() {
+        out.tag(index);
+        bounding_box(out, linear, chart.nodes());
+        let passages = network.loops(ChartId::at(index)).concat();
+        out.size(passages.len());
+        passages.iter().for_each(|p| out.signed_tag(p.curve.index(), p.forward));
+    }
+}
+
+/// The node at each point of the network.
+fn point_nodes(linear: &LinearAtlas, network: &SeamNetwork) -> Vec<u32> {
+    let mut nodes = vec![0; network.points().len()];
+    for (curve, along) in network.curves().iter().zip(linear.curves()) {
+        let [begin, end] = curve.ends();
+        (nodes[begin], nodes[end]) = (along[0], along[along.len() - 1]);
+    }
+    nodes
+}
+
+/// The box around some nodes, and no physical groups.
+fn bounding_box(out: &mut Binary, linear: &LinearAtlas, nodes: &[u32]) {
+    let around = BoundingBox::of(nodes.iter().map(|n| linear.points()[*n as usize]));
+    let around = around.unwrap_or(BoundingBox { min: [0.0; 3], max: [0.0; 3] });
+    out.doubles(&around.min);
+    out.doubles(&around.max);
+    out.size(0);
+}
+
+fn parametrizations(out: &mut Binary, linear: &LinearAtlas) {
+    out.size(linear.curves().len());
+    out.size(linear.charts().len());
+    for (index, nodes) in linear.curves().iter().enumerate() {
+        out.tag(index);
+        out.size(nodes.len());
+        for (t, node) in nodes.iter().enumerate() {
+            out.doubles(&linear.points()[*node as usize]);
+            out.doubles(&[t as f64]);
+        }
+    }
+    for (index, chart) in linear.charts().iter().enumerate() {
+        out.tag(index);
+        surface(out, linear, chart);
+    }
+}
+
+fn surface(out: &mut Binary, linear: &LinearAtlas, chart: &LinearChart) {
+    out.size(chart.nodes().len());
+    out.size(chart.triangles().len());
+    for (node, uv) in chart.nodes().iter().zip(chart.uv()) {
+        let [largest, smallest] = linear.curvatures()[*node as usize];
+        out.doubles(&linear.points()[*node as usize]);
+        out.doubles(&uv.uv());
+        out.doubles(&largest);
+        out.doubles(&smallest);
+    }
+    chart.triangles().iter().flatten().for_each(|n| out.int(*n as i32));
+}
