@@ -3,7 +3,8 @@
 //! An edge may be a feature where its dihedral angle exceeds a threshold, and joins others down to a lower one
 //! (hysteresis). Noise makes such edges, too: slivers have any normal. So the angle is measured again between the mean
 //! normals of the triangles around, weighted by area, on either side: sides that meet around the ends of the edge
-//! within a few triangles are the same side. Chains that are short all told are dropped.
+//! within a few triangles are the same side. Chains that are short all told are dropped, and patches that are small
+//! all round are given to the neighbour with which they share most.
 
 use super::dual::Dual;
 use crate::id::HalfEdgeId;
@@ -17,7 +18,10 @@ const LOWER: f64 = 0.625;
 const SIDE: usize = 12;
 
 /// The least length of connected features, as a share of the size of the surface (the square root of its area).
-const LEAST_LENGTH: f64 = 0.03;
+const LEAST_LENGTH: f64 = 0.06;
+
+/// The least outline of a patch between features, likewise.
+const LEAST_OUTLINE: f64 = 0.12;
 
 /// Marks the feature edges of `dual`: dihedral angle above `angle` degrees. Returns their number.
 pub(super) fn mark_features(dual: &mut Dual, angle: f64) -> usize {
@@ -37,7 +41,54 @@ pub(super) fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     let strong: Vec<bool> = measured.iter().map(|(_, [m, n])| is_bent(*m, *n, sharp)).collect();
     let kept = long_enough(dual, &measured.iter().map(|m| m.0).collect::<Vec<_>>(), &strong);
     kept.iter().for_each(|h| dual.feature[dual.mesh.edges().edge(*h).index()] = true);
-    kept.len()
+    drop_small_patches(dual, &kept);
+    dual.feature.iter().filter(|f| **f).count()
+}
+
+/// Unites patches with a short outline with their neighbours, the shortest first: the features between them are none.
+fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId]) {
+    let mut patches = UnionFind::new(dual.mesh.triangles().len());
+    for h in dual.half_edges().filter(|h| !dual.is_feature(*h)) {
+        if let Some(t) = dual.across(h) {
+            patches.unite(h.face().index(), t.face().index());
+        }
+    }
+    let (patch_of, count) = patches.labels();
+    let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
+    let mut outlines = vec![0.0; count];
+    for h in dual.half_edges().filter(|h| dual.across(*h).is_none_or(|t| patch(t) != patch(*h))) {
+        outlines[patch(h)] += dual.length(h);
+    }
+    let least = LEAST_OUTLINE * total_area(dual).sqrt();
+    let mut between: Vec<(usize, usize, f64)> = Vec::new();
+    for h in features.iter().flat_map(|h| [Some(*h), dual.across(*h)]).flatten() {
+        if let Some(t) = dual.across(h).filter(|t| patch(*t) != patch(h)) {
+            between.push((patch(h), patch(t), dual.length(h)));
+        }
+    }
+    between.sort_unstable_by_key(|(a, b, _)| (*a, *b));
+    let mut small: Vec<usize> = (0..count).filter(|p| outlines[*p] < least).collect();
+    small.sort_unstable_by(|a, b| outlines[*a].total_cmp(&outlines[*b]).then(a.cmp(b)));
+    let mut united = UnionFind::new(count);
+    for p in small {
+        let run = &between[between.partition_point(|b| b.0 < p)..between.partition_point(|b| b.0 <= p)];
+        let shared = run.chunk_by(|a, b| a.1 == b.1).map(|c| (c.iter().map(|b| b.2).sum::<f64>(), c[0].1));
+        if let Some((_, neighbour)) = shared.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))) {
+            united.unite(p, neighbour);
+        }
+    }
+    for h in features {
+        let inside =
+            dual.across(*h).is_some_and(|t| patch(t) != patch(*h) && united.find(patch(t)) == united.find(patch(*h)));
+        if inside {
+            let edge = dual.mesh.edges().edge(*h).index();
+            dual.feature[edge] = false;
+        }
+    }
+}
+
+fn total_area(dual: &Dual) -> f64 {
+    (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum()
 }
 
 /// Whether two normals (of any length) differ by more than the angle with this cosine.
@@ -73,7 +124,6 @@ fn long_enough(dual: &Dual, edges: &[HalfEdgeId], strong: &[bool]) -> Vec<HalfEd
     for (h, _) in edges.iter().zip(strong).filter(|(_, s)| **s) {
         lengths[sets.find(dual.from(*h))] += dual.length(*h);
     }
-    let area: f64 = (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum();
-    let least = LEAST_LENGTH * area.sqrt();
+    let least = LEAST_LENGTH * total_area(dual).sqrt();
     edges.iter().copied().filter(|h| lengths[sets.find(dual.from(*h))] >= least).collect()
 }

@@ -111,15 +111,22 @@ fn finish(
     let mut network = Network::new(dual, labels, limits);
     let mut verdicts = judge(&mut network, cells);
     for band in BANDS {
-        let mut straight = Network::new(dual, network.labels.clone(), limits);
-        straighten(&mut straight, |h| band * size(h));
-        let found = judge(&mut straight, cells);
-        let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
-        let worse = |(new, old)| ratio(new) > settings.max_area_ratio.max(ratio(old));
-        if !straight.is_sound() || found.iter().zip(&verdicts).any(worse) {
-            break;
+        let mut held = vec![false; network.label_count()];
+        for _ in 0..TRIES {
+            let mut straight = Network::new(dual, network.labels.clone(), limits);
+            let holds = |h: HalfEdgeId| held[network.labels[h.face().index()] as usize];
+            let free = |h: HalfEdgeId| !holds(h) && !dual.across(h).is_some_and(holds);
+            straighten(&mut straight, |h| if free(h) { band * size(h) } else { 0.0 });
+            let found = judge(&mut straight, cells);
+            let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
+            let worse = |label: usize| ratio(&found[label]) > settings.max_area_ratio.max(ratio(&verdicts[label]));
+            let bad: Vec<usize> = (0..held.len()).filter(|l| worse(*l)).collect();
+            if bad.is_empty() && straight.is_sound() {
+                (network, verdicts) = (straight, found);
+                break;
+            }
+            bad.into_iter().for_each(|label| held[label] = true);
         }
-        (network, verdicts) = (straight, found);
     }
     let mut atlas = assemble(dual.mesh, &network.labels)?;
     choose_outer(&mut atlas, &verdicts);
@@ -153,7 +160,10 @@ const MARGIN: f64 = 0.85;
 
 /// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
 /// seams along a tube come together. So the area ratio is foretold again after every step, and the last good one kept.
-const BANDS: [f64; 3] = [1.0, 1.5, 2.0];
+const BANDS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
+
+/// How often a step is tried again with the seams held around the charts that it would distort too much.
+const TRIES: usize = 3;
 
 /// Cells per component, at most.
 const CELLS: usize = 800;
