@@ -132,7 +132,7 @@ fn a_plate_of_genus_9_is_remeshed_from_two_halves() {
     let (folder, report) = write_labelled(out.path(), &soup, &settings(None), |p| u32::from(p[2] > 0.0));
     assert_eq!((report.seams.curves, report.seams.corners, report.charts[0].loops), (10, 0, 10));
     assert!(report.hand_off.is_some_and(|h| h.warning.is_none()));
-    assert_vtk_agrees(&[folder.clone()]);
+    assert_vtk_agrees(std::slice::from_ref(&folder));
     assert_gmsh_remeshes(&[folder], &[]);
 }
 
