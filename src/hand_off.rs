@@ -45,12 +45,22 @@ pub fn gmsh(
     if let Some(warning) = &report.warning {
         tracing::warn!("hand-off to Gmsh: {warning}");
     }
-    HandedOff { files: files(&linear, network, size), report: counted(report, &linear) }
+    HandedOff { files: files(mesh, charts, &linear, network, size), report: counted(report, &linear) }
 }
 
-fn files(linear: &LinearAtlas, network: &SeamNetwork, size: f64) -> Vec<(String, Vec<u8>)> {
-    let script = gmsh::Script { size, surfaces: linear.charts().len(), curves: linear.curves().len() };
-    vec![(gmsh::ATLAS.to_owned(), gmsh::atlas(linear, network)), (gmsh::REMESH.to_owned(), gmsh::remesh(&script))]
+fn files(
+    mesh: &SurfaceMesh,
+    charts: &[Chart],
+    linear: &LinearAtlas,
+    network: &SeamNetwork,
+    size: f64,
+) -> Vec<(String, Vec<u8>)> {
+    let script =
+        gmsh::Script { size, area: mesh.area(), surfaces: linear.charts().len(), curves: linear.curves().len() };
+    vec![
+        (gmsh::ATLAS.to_owned(), gmsh::atlas(charts, linear, network)),
+        (gmsh::REMESH.to_owned(), gmsh::remesh(&script)),
+    ]
 }
 
 fn counted(report: HandOff, linear: &LinearAtlas) -> HandOff {

@@ -3,6 +3,7 @@
 //! so and pass.
 
 use crate::interop::assert_vtk_agrees;
+use crate::interop::remesh::assert_gmsh_remeshes;
 use crate::legality::assert_legal;
 use crate::support::{Out, planish, root};
 use planish::outcome::{Code, Status};
@@ -67,6 +68,7 @@ fn real_disks_are_certified_proven_again_and_opened_by_vtk() {
     assert!(bunny.distortion.area_ratio > 1e9, "far more than one chart should bear: {:?}", bunny.distortion);
     let folders: Vec<PathBuf> = reports.iter().map(|(name, _)| out.of(name)).collect();
     assert_vtk_agrees(&folders);
+    assert_gmsh_remeshes(&["terrain_gmsh.stl", "patch_10k.stl", "bunny_stanford.stl"].map(|n| out.of(n)), &[]);
 }
 
 #[test]

@@ -1,9 +1,10 @@
-//! The real VTK opens what planish writes, and an independent program proves the triangles valid again.
+//! The real VTK opens what planish writes, an independent program proves the triangles valid again, and the real Gmsh
+//! remeshes through the maps.
 //!
 //! The Python environment is made beside the sources (`.venv`, not under version control) when a test first needs
 //! it, with the packages of requirements.txt.
 
-mod remesh;
+pub mod remesh;
 
 use crate::support::{Out, fixture, root};
 use std::path::{Path, PathBuf};

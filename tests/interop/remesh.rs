@@ -1,7 +1,7 @@
 //! The real Gmsh remeshes through the maps that planish hands it.
 
 use super::{assert_vtk_agrees, run, script};
-use crate::support::{Out, fixture};
+use crate::support::{Out, fixture, planish};
 use pipeline::decompose::assemble;
 use pipeline::mesh::TriangleSoup;
 use pipeline::{repair, shapes};
@@ -103,6 +103,73 @@ fn charts_that_share_seams_are_remeshed_conformingly() {
     let folders = folders.map(|(folder, _)| folder);
     assert_vtk_agrees(&folders);
     assert_gmsh_remeshes(&folders, &[]);
+}
+
+/// A disk whose ring of triangles around the centre is cut in the middles of its spokes on one side only: the gaps
+/// are filled by exactly flat triangles, as CAD exporters leave them.
+fn disk_with_flat_triangles() -> TriangleSoup {
+    let disk = shapes::disk(8);
+    let mut points = disk.points().to_vec();
+    let mut triangles = Vec::new();
+    for t in disk.triangles() {
+        let Some(k) = t.iter().position(|v| *v == 0) else {
+            triangles.push(*t);
+            continue;
+        };
+        let [centre, a, b] = [t[k], t[(k + 1) % 3], t[(k + 2) % 3]];
+        let middle = points.len() as u32;
+        points.push([0, 1, 2].map(|i| 0.5 * points[centre as usize][i] + 0.5 * points[a as usize][i]));
+        triangles.extend([[middle, a, b], [centre, middle, b], [centre, a, middle]]);
+    }
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn a_plate_of_genus_9_is_remeshed_from_two_halves() {
+    let out = tempfile::tempdir().expect("a folder");
+    let bytes = std::fs::read(fixture("plate_genus9.stl")).expect("a fixture");
+    let soup = planish::formats::read(planish::formats::Format::Stl, &bytes).expect("readable");
+    let (folder, report) = write_labelled(out.path(), &soup, &settings(None), |p| u32::from(p[2] > 0.0));
+    assert_eq!((report.seams.curves, report.seams.corners, report.charts[0].loops), (10, 0, 10));
+    assert!(report.hand_off.is_some_and(|h| h.warning.is_none()));
+    assert_vtk_agrees(std::slice::from_ref(&folder));
+    assert_gmsh_remeshes(&[folder], &[]);
+}
+
+#[test]
+fn exactly_flat_triangles_do_not_stop_gmsh() {
+    let out = tempfile::tempdir().expect("a folder");
+    let (folder, report) = write_labelled(out.path(), &disk_with_flat_triangles(), &settings(None), |_| 0);
+    assert!(report.hand_off.is_some_and(|h| h.moved_vertices >= 6));
+    assert_gmsh_remeshes(&[folder], &[]);
+}
+
+/// A cylinder with a fin along one ruling: repair cuts it open there, and its two ends lie on each other.
+fn cut_cylinder() -> TriangleSoup {
+    let (n, m) = (12, 4);
+    let point = |i: u32, j: u32| {
+        let angle = TAU * f64::from(i) / f64::from(n);
+        [angle.cos(), angle.sin(), 0.5 * f64::from(j)]
+    };
+    let tube = (0..n).flat_map(|i| (0..=m).map(move |j| (i, j))).map(|(i, j)| point(i, j));
+    let points = tube.chain((0..=m).map(|j| [2.0, 0.0, 0.5 * f64::from(j)])).collect();
+    let at = |i: u32, j: u32| if i > n { n * (m + 1) + j } else { i % n * (m + 1) + j };
+    let quad = |i: u32, k: u32, j: u32| [[at(i, j), at(k, j), at(k, j + 1)], [at(i, j), at(k, j + 1), at(i, j + 1)]];
+    let sides = (0..n).map(|i| (i, i + 1)).chain([(0, n + 1)]);
+    let triangles = sides.flat_map(|(i, k)| (0..m).flat_map(move |j| quad(i, k, j))).collect();
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn a_hand_off_that_fails_is_told_and_the_maps_are_certified_all_the_same() {
+    let out = tempfile::tempdir().expect("a folder");
+    let fin = |p: [f64; 3]| u32::from(p[0].hypot(p[1]) > 1.0);
+    let (folder, report) = write_labelled(out.path(), &cut_cylinder(), &settings(None), fin);
+    let failure = report.hand_off.and_then(|h| h.failure).expect("a failure");
+    assert!(failure.contains("lies on both sides of curve"), "{failure}");
+    assert!(!folder.join("atlas.msh").exists() && folder.join("seams.vtp").exists());
+    let checked = planish(["check".as_ref(), folder.as_os_str()]);
+    assert_eq!(checked.code, Some(0), "{}", checked.err);
 }
 
 #[test]

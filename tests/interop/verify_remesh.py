@@ -1,6 +1,7 @@
 """verify_remesh.py [--seconds N] [--any-size] RESULT...: remeshes each result with the real Gmsh (`gmsh remesh.geo -2`,
 no other flags, in a copy of the hand-off) and looks at what came out:
 
+- Gmsh reads the triangles of the input from atlas.msh, and its maps are those of surface.vtu;
 - Gmsh ends in time and without an error, and writes remesh.msh;
 - the mesh has the Euler number of the input, open edges only along open edges of the input, edges of more than two
   triangles only along such edges, and no two triangles on the same three nodes;
@@ -26,12 +27,16 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 TOLERANCE = 1e-9
 
 
-def read_surface(path):
-    """Points and triangles of the input, and the chart of each triangle."""
+def read_grid(path):
     reader = vtkXMLUnstructuredGridReader()
     reader.SetFileName(path)
     reader.Update()
-    grid = reader.GetOutput()
+    return reader.GetOutput()
+
+
+def read_surface(path):
+    """Points and triangles of the input, and the chart of each triangle."""
+    grid = read_grid(path)
     points = vtk_to_numpy(grid.GetPoints().GetData()).astype(float)
     cells = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 6)[:, :3]
     used, triangles = numpy.unique(cells, return_inverse=True)
@@ -70,6 +75,41 @@ def read_mesh(path):
                     lines.append(number[nodes.astype(int)].reshape(-1, 2))
         assert triangles and lines, "the mesh is empty"
         return points.reshape(-1, 3), numpy.concatenate(triangles), numpy.concatenate(surfaces), numpy.concatenate(lines)
+    finally:
+        gmsh.finalize()
+
+
+def inner_nodes(cells):
+    """Nodes of 6-node triangles that do not lie on the boundary; a few hundred of them."""
+    middles, count = numpy.unique(cells[:, 3:], return_counts=True)
+    open_side = numpy.isin(cells[:, 3:], middles[count == 1])
+    outer = numpy.unique(numpy.concatenate(
+        [cells[open_side[:, k]][:, [k, (k + 1) % 3, 3 + k]].ravel() for k in range(3)]))
+    inner = numpy.setdiff1d(cells, outer)
+    return inner[:: max(1, len(inner) // 300)]
+
+
+def verify_atlas(folder, linear_charts, diagonal):
+    """Gmsh reads the triangles of the input from atlas.msh, and its maps are those of surface.vtu."""
+    grid = read_grid(os.path.join(folder, "surface.vtu"))
+    places, uv = vtk_to_numpy(grid.GetPoints().GetData()), vtk_to_numpy(grid.GetPointData().GetArray("uv"))
+    cells = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 6)
+    charts = vtk_to_numpy(grid.GetCellData().GetArray("chart"))
+    gmsh.initialize(["", "-v", "1"])
+    try:
+        gmsh.open(os.path.join(folder, "atlas.msh"))
+        for chart in numpy.unique(charts):
+            mine, tag = cells[charts == chart], int(chart) + 1
+            count = sum(len(tags) for tags in gmsh.model.mesh.getElements(2, tag)[1])
+            assert count == len(mine), f"atlas.msh holds {count} triangles of chart {chart}, the input {len(mine)}"
+            nodes = inner_nodes(mine)
+            thickness = numpy.linalg.svd(places[mine[:, :3].ravel()] - places[mine[0, 0]], compute_uv=False)[-1]
+            if chart in linear_charts or not len(nodes) or thickness <= 1e-6 * diagonal:
+                # Other places in the plane, or a flat chart, which Gmsh projects.
+                continue
+            x = numpy.array(gmsh.model.getValue(2, tag, uv[nodes].ravel())).reshape(-1, 3)
+            off = numpy.abs(x - places[nodes]).max() / diagonal
+            assert off < TOLERANCE, f"chart {chart}: Gmsh's map is off by {off:.1e} of the diagonal"
     finally:
         gmsh.finalize()
 
@@ -205,6 +245,7 @@ def verify(folder, seconds, sizes):
     report = json.load(open(os.path.join(folder, "report.json"), encoding="utf-8"))
     surface, faces, charts = read_surface(os.path.join(folder, "surface.vtu"))
     diagonal = numpy.linalg.norm(surface.max(0) - surface.min(0))
+    verify_atlas(folder, report["hand_off"]["linear_charts"], diagonal)
     points, triangles, surfaces, lines, said = remesh(folder, seconds)
     assert sorted(set(surfaces)) == sorted(set(charts)), "every chart has triangles"
     assert len(numpy.unique(numpy.sort(triangles, 1), axis=0)) == len(triangles), "two triangles on the same nodes"

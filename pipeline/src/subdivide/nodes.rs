@@ -2,7 +2,7 @@
 
 use crate::atlas::Chart;
 use crate::curvature::{self, Principal};
-use crate::id::{EdgeId, HalfEdgeId, VertexId};
+use crate::id::{EdgeId, FaceId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;
 use crate::seams::{Curve, SeamNetwork};
 use crate::space::{Vec3, midpoint};
@@ -23,7 +23,7 @@ pub(super) struct Nodes {
     curve_edges: Vec<Vec<u32>>,
 }
 
-/// The half-edge of the surface that a half-edge of a chart is.
+/// The half-edge of the surface that a half-edge of a chart is: triangles begin at the same corner in both.
 pub(super) fn on_surface(chart: &Chart, h: HalfEdgeId) -> HalfEdgeId {
     HalfEdgeId::side_of(chart.faces()[h.face().index()], h.side())
 }
@@ -67,6 +67,9 @@ impl Nodes {
 
     /// The nodes of a chart: its vertices, then the middles of its edges.
     pub(super) fn of_chart(&self, mesh: &SurfaceMesh, chart: &Chart) -> Vec<u32> {
+        let same =
+            |(f, t): (&FaceId, &[VertexId; 3])| mesh.triangles()[f.index()] == t.map(|v| chart.vertices()[v.index()]);
+        debug_assert!(chart.faces().iter().zip(chart.triangles()).all(same));
         let vertices = chart.vertices().iter().map(|v| self.at_vertex(*v));
         let middles = chart.edges().iter().map(|(_, sides)| self.at_middle(mesh, on_surface(chart, sides[0])));
         vertices.chain(middles).collect()

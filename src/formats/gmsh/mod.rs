@@ -4,10 +4,12 @@
 
 mod binary;
 mod geo;
+mod mesh;
 
 pub use geo::{Script, remesh};
 
 use binary::Binary;
+use pipeline::atlas::Chart;
 use pipeline::id::ChartId;
 use pipeline::seams::SeamNetwork;
 use pipeline::space::BoundingBox;
@@ -24,9 +26,10 @@ pub const REMESH: &str = "remesh.geo";
 /// `$Entities` holds the boundary representation: a point for every end of a curve, the curves of `network`, a
 /// surface per chart. `$Parametrizations` holds the curves as polylines and the charts as triangulations in space
 /// and in the plane; see docs/gmsh.md for what Gmsh asks of it. Tags are positions plus one.
-pub fn atlas(linear: &LinearAtlas, network: &SeamNetwork) -> Vec<u8> {
+pub fn atlas(charts: &[Chart], linear: &LinearAtlas, network: &SeamNetwork) -> Vec<u8> {
     let mut out = Binary::new();
     out.section("Entities", |out| entities(out, linear, network));
+    mesh::write(&mut out, charts, linear, network);
     out.section("Parametrizations", |out| parametrizations(out, linear));
     out.bytes
 }
