@@ -161,7 +161,7 @@ mod tests {
             let points = soup.points().iter().map(|p| p.map(|c| c * scale)).collect();
             let soup = crate::mesh::TriangleSoup::new(points, soup.triangles().to_vec()).expect("sound");
             let mesh = repair(&soup, &Default::default()).expect("a surface").mesh;
-            let atlas = decompose(&mesh, &Default::default()).expect("one chart");
+            let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart");
             let chart = &atlas.charts()[0];
             let done = finish_chart(map_chart(chart, Order::Quadratic).expect("maps"));
             let fields = fields(chart, &done.certified);

@@ -311,7 +311,7 @@ mod tests {
 
     fn closed(soup: &TriangleSoup) -> ClosedChart {
         let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-        ClosedChart::new(&decompose(&mesh, &Default::default()).expect("one chart").charts()[0])
+        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
     }
 
     fn valid(chart: &ClosedChart, nodes: &[GridPoint]) -> bool {

@@ -158,7 +158,9 @@ mod tests {
     #[test]
     fn the_map_has_no_more_energy_than_the_raised_linear_one() {
         let mesh = repair(&shapes::disk_with_holes(13, 2), &Default::default()).expect("a surface").mesh;
-        let chart = ClosedChart::new(&decompose(&mesh, &Default::default()).expect("one chart").charts()[0]);
+        let chart = ClosedChart::new(
+            &decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0],
+        );
         let boundary = Boundary::circle(&chart, Mids::Arc);
         let start = linear::linear_map(&chart, &boundary).expect("maps").raised(&chart, &boundary);
         let map = quadratic_map(&chart, &boundary).expect("solves");
@@ -174,7 +176,9 @@ mod tests {
     #[test]
     fn a_flat_round_disk_is_mapped_to_itself() {
         let mesh = repair(&shapes::flat_disk(6), &Default::default()).expect("a surface").mesh;
-        let chart = ClosedChart::new(&decompose(&mesh, &Default::default()).expect("one chart").charts()[0]);
+        let chart = ClosedChart::new(
+            &decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0],
+        );
         let boundary = Boundary::circle(&chart, Mids::Chord);
         let map = quadratic_map(&chart, &boundary).expect("solves");
         assert!(map.invalid().is_empty());

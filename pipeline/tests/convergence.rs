@@ -29,7 +29,8 @@ fn rule() -> Vec<([f64; 3], f64)> {
 /// The L2 errors of the linear and the quadratic harmonic map on a flat disk with `rings` rings.
 fn errors(rings: u32) -> [f64; 2] {
     let mesh = repair(&shapes::flat_disk(rings), &Default::default()).expect("a surface").mesh;
-    let chart = ClosedChart::new(&decompose(&mesh, &Default::default()).expect("one chart").charts()[0]);
+    let chart =
+        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
     let place = |v: pipeline::id::VertexId| mesh.points()[v.index()];
     let ends = |h: &pipeline::id::HalfEdgeId| chart.ends(*h).map(place);
     let vertices: Vec<_> = chart.outer().iter().map(|h| exact(ends(h)[0])).collect();

@@ -23,7 +23,7 @@ struct Example {
 
 fn closed(soup: &TriangleSoup) -> ClosedChart {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-    ClosedChart::new(&decompose(&mesh, &Default::default()).expect("one chart").charts()[0])
+    ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
 }
 
 /// F5 with its boundary on the corners of a square.
@@ -184,7 +184,8 @@ fn maps_do_not_depend_on_unit_place_or_numbering() {
 /// few points without triangles: -1).
 fn radii(soup: &TriangleSoup) -> Vec<f64> {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-    let chart = ClosedChart::new(&decompose(&mesh, &Default::default()).expect("one chart").charts()[0]);
+    let chart =
+        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
     let map = quadratic_map(&chart, &Boundary::circle(&chart, Mids::Arc)).expect("solves");
     let mut radii = vec![-1.0; soup.points().len()];
     for v in 0..mesh.points().len() {

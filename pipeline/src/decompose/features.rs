@@ -41,50 +41,51 @@ pub(super) fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     let strong: Vec<bool> = measured.iter().map(|(_, [m, n])| is_bent(*m, *n, sharp)).collect();
     let kept = long_enough(dual, &measured.iter().map(|m| m.0).collect::<Vec<_>>(), &strong);
     kept.iter().for_each(|h| dual.feature[dual.mesh.edges().edge(*h).index()] = true);
-    drop_small_patches(dual, &kept);
+    let least = LEAST_OUTLINE * total_area(dual).sqrt();
+    // Every time some patches are united with others, so that fewer are left.
+    while drop_small_patches(dual, &kept, least) {}
     dual.feature.iter().filter(|f| **f).count()
 }
 
-/// Unites patches with a short outline with their neighbours, the shortest first: the features between them are none.
-fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId]) {
-    let mut patches = UnionFind::new(dual.mesh.triangles().len());
-    for h in dual.half_edges().filter(|h| !dual.is_feature(*h)) {
-        if let Some(t) = dual.across(h) {
-            patches.unite(h.face().index(), t.face().index());
-        }
-    }
-    let (patch_of, count) = patches.labels();
+/// Unites each patch whose outline is shorter than `least` with the neighbour with which it shares most: the features
+/// between them are none. Whether there was such a patch.
+fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId], least: f64) -> bool {
+    let (patch_of, count) = patches(dual);
     let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
     let mut outlines = vec![0.0; count];
     for h in dual.half_edges().filter(|h| dual.across(*h).is_none_or(|t| patch(t) != patch(*h))) {
         outlines[patch(h)] += dual.length(h);
     }
-    let least = LEAST_OUTLINE * total_area(dual).sqrt();
-    let mut between: Vec<(usize, usize, f64)> = Vec::new();
-    for h in features.iter().flat_map(|h| [Some(*h), dual.across(*h)]).flatten() {
-        if let Some(t) = dual.across(h).filter(|t| patch(*t) != patch(h)) {
-            between.push((patch(h), patch(t), dual.length(h)));
-        }
-    }
-    between.sort_unstable_by_key(|(a, b, _)| (*a, *b));
-    let mut small: Vec<usize> = (0..count).filter(|p| outlines[*p] < least).collect();
-    small.sort_unstable_by(|a, b| outlines[*a].total_cmp(&outlines[*b]).then(a.cmp(b)));
+    let both = features.iter().flat_map(|h| [Some(*h), dual.across(*h)]).flatten();
+    let pairs = both.filter_map(|h| Some((patch(h), patch(dual.across(h)?), dual.length(h))));
+    let mut between: Vec<_> = pairs.filter(|(a, b, _)| a != b && outlines[*a] < least).collect();
+    between.sort_unstable_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)).then(x.2.total_cmp(&y.2)));
     let mut united = UnionFind::new(count);
-    for p in small {
-        let run = &between[between.partition_point(|b| b.0 < p)..between.partition_point(|b| b.0 <= p)];
-        let shared = run.chunk_by(|a, b| a.1 == b.1).map(|c| (c.iter().map(|b| b.2).sum::<f64>(), c[0].1));
-        if let Some((_, neighbour)) = shared.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))) {
-            united.unite(p, neighbour);
+    for of_patch in between.chunk_by(|x, y| x.0 == y.0) {
+        let shared = of_patch.chunk_by(|x, y| x.1 == y.1).map(|c| (c.iter().map(|b| b.2).sum::<f64>(), c[0].1));
+        if let Some((_, neighbour)) = shared.max_by(|x, y| x.0.total_cmp(&y.0).then(y.1.cmp(&x.1))) {
+            united.unite(of_patch[0].0, neighbour);
         }
     }
     for h in features {
-        let inside =
-            dual.across(*h).is_some_and(|t| patch(t) != patch(*h) && united.find(patch(t)) == united.find(patch(*h)));
-        if inside {
+        let Some(t) = dual.across(*h).filter(|t| patch(*t) != patch(*h)) else { continue };
+        if united.find(patch(t)) == united.find(patch(*h)) {
             let edge = dual.mesh.edges().edge(*h).index();
             dual.feature[edge] = false;
         }
     }
+    !between.is_empty()
+}
+
+/// Per triangle the patch between features to which it belongs, and their number.
+fn patches(dual: &Dual) -> (Vec<u32>, usize) {
+    let mut sets = UnionFind::new(dual.mesh.triangles().len());
+    for h in dual.half_edges().filter(|h| !dual.is_feature(*h)) {
+        if let Some(t) = dual.across(h) {
+            sets.unite(h.face().index(), t.face().index());
+        }
+    }
+    sets.labels()
 }
 
 fn total_area(dual: &Dual) -> f64 {

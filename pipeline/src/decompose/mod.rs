@@ -1,15 +1,26 @@
 //! Decomposition: surface -> atlas of charts.
 //!
 //! A chart is connected, oriented, of genus 0, with at least one boundary loop; its loops are simple and share no
-//! vertex. A surface that is one chart already (a disk, or a disk with holes) becomes an atlas of one. Any other
-//! surface is refused with the numbers that say why.
+//! vertex. Any surface is cut into charts: closed ones, of any genus, of several components, with holes; one that
+//! cannot be oriented is cut where its triangles disagree. A component that can be one chart is left whole.
 //!
-//! The longest loop becomes the outer one (the first, in a tie): all others are holes.
+//! 1. Feature edges are found ([`Settings::feature_angle`]); no chart crosses those that separate it from another.
+//! 2. The triangles are gathered into some hundred compact cells, by geodesic distance: what follows depends on the
+//!    shape, not on the triangulation.
+//! 3. Charts grow from a few dozen groups of cells: the cheapest pair of neighbours is united again and again, as
+//!    long as the union is legal (its Euler number, its loops) and its area ratio, predicted by a harmonic map of the
+//!    graph of cells, is small enough. This is done several ways; few charts win, then short seams and small ratios.
+//! 4. Seams are straightened on the triangulation itself, a little at a time, while the predicted ratio allows it.
+//! 5. The outer loop of every chart is the one that is predicted to distort it least.
+//!
+//! What the maps themselves show too distorted is [`split()`]; ears are split by [`split_ears`]. The cost is that of
+//! sorting, but for a fixed number of cells; every loop has its reason to end beside it.
 
 mod assemble;
 mod dual;
 mod ears;
 mod features;
+mod finish;
 mod judge;
 mod legality;
 mod merge;
@@ -24,41 +35,26 @@ mod voronoi;
 
 use crate::atlas::Atlas;
 use crate::id::HalfEdgeId;
-use crate::mesh::{Census, SurfaceMesh};
+use crate::mesh::SurfaceMesh;
 pub use assemble::assemble;
 use dual::Dual;
 pub use ears::{WithoutEars, split_ears};
 use features::mark_features;
-use judge::{Verdict, choose_outer, judge};
+use finish::finish;
 pub use legality::Illegal;
 use merge::Limits;
-use network::Network;
 use predict::CellGraph;
 use regions::Regions;
 use search::Search;
 pub use split::split;
-use straighten::straighten;
 use voronoi::{Cells, bisect_until, farthest_first};
 
-/// Why a surface has no atlas.
+/// Why a surface has no atlas: a fault of planish, as every surface has one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// The surface is no disk and no disk with holes.
-    #[error("{}", needs_decomposition(.0))]
-    NeedsDecomposition(Box<Census>),
-    /// A chart came out that is none: a fault of planish.
+    /// A chart came out that is none.
     #[error(transparent)]
     Illegal(#[from] Illegal),
-}
-
-fn needs_decomposition(c: &Census) -> String {
-    let genus = c.genus.map_or("no genus".to_owned(), |g| format!("genus {g}"));
-    let kind = if c.orientable { "orientable" } else { "not orientable" };
-    format!(
-        "the surface is not one disk (with or without holes): {} components, {genus}, {} boundary loops, {kind}, \
-         {} non-manifold edges, {} non-manifold vertices; cut it into such pieces, one file each",
-        c.components, c.boundary_loops, c.nonmanifold_edges, c.nonmanifold_vertices
-    )
 }
 
 /// What charts must respect.
@@ -99,40 +95,6 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
     Ok(Atlas { feature_edges: features, ..atlas })
 }
 
-/// Straightens the seams between labels and makes the charts. `size` tells that of a cell.
-fn finish(
-    dual: &Dual,
-    labels: Vec<u32>,
-    limits: Limits,
-    settings: &Settings,
-    cells: &Cells,
-    size: impl Fn(HalfEdgeId) -> f64,
-) -> Result<Atlas, Error> {
-    let mut network = Network::new(dual, labels, limits);
-    let mut verdicts = judge(&mut network, cells);
-    for band in BANDS {
-        let mut held = vec![false; network.label_count()];
-        for _ in 0..TRIES {
-            let mut straight = Network::new(dual, network.labels.clone(), limits);
-            let holds = |h: HalfEdgeId| held[network.labels[h.face().index()] as usize];
-            let free = |h: HalfEdgeId| !holds(h) && !dual.across(h).is_some_and(holds);
-            straighten(&mut straight, |h| if free(h) { band * size(h) } else { 0.0 });
-            let found = judge(&mut straight, cells);
-            let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
-            let worse = |label: usize| ratio(&found[label]) > settings.max_area_ratio.max(ratio(&verdicts[label]));
-            let bad: Vec<usize> = (0..held.len()).filter(|l| worse(*l)).collect();
-            if bad.is_empty() && straight.is_sound() {
-                (network, verdicts) = (straight, found);
-                break;
-            }
-            bad.into_iter().for_each(|label| held[label] = true);
-        }
-    }
-    let mut atlas = assemble(dual.mesh, &network.labels)?;
-    choose_outer(&mut atlas, &verdicts);
-    Ok(atlas)
-}
-
 impl Limits {
     fn new(settings: &Settings) -> Self {
         Self {
@@ -158,55 +120,8 @@ fn cells(dual: &Dual, limits: &Limits) -> Cells {
 /// seams change it.
 const MARGIN: f64 = 0.85;
 
-/// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
-/// seams along a tube come together. So the area ratio is foretold again after every step, and the last good one kept.
-const BANDS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
-
-/// How often a step is tried again with the seams held around the charts that it would distort too much.
-const TRIES: usize = 3;
-
 /// Cells per component, at most.
 const CELLS: usize = 800;
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::id::VertexId;
-    use crate::repair::{Settings, repair};
-    use crate::{mesh::TriangleSoup, shapes};
-
-    fn atlas(soup: &TriangleSoup) -> Result<Atlas, Error> {
-        decompose(&repair(soup, &Settings::default()).expect("a surface is left").mesh, &Default::default())
-    }
-
-    #[test]
-    fn a_disk_with_holes_is_one_legal_chart() {
-        let atlas = atlas(&shapes::disk_with_holes(17, 3)).expect("one chart");
-        let chart = &atlas.charts()[0];
-        assert_eq!((atlas.charts().len(), chart.holes().len(), chart.outer().len()), (1, 3, 68));
-        let mut on_loops: Vec<VertexId> =
-            chart.holes().iter().flatten().chain(chart.outer()).map(|h| chart.from(*h)).collect();
-        let all = on_loops.len();
-        on_loops.sort_unstable();
-        on_loops.dedup();
-        assert_eq!(on_loops.len(), all, "loops are simple and share no vertex");
-        let chi = chart.vertices().len() as i64 - chart.edges().len() as i64 + chart.triangles().len() as i64;
-        assert_eq!((2 - 4 - chi) / 2, 0, "genus 0");
-        for l in chart.holes().iter().chain([&chart.outer().to_vec()]) {
-            for (i, h) in l.iter().enumerate() {
-                let next = l[(i + 1) % l.len()];
-                assert_eq!(chart.triangles()[h.face().index()][h.next().side()], chart.from(next));
-            }
-        }
-    }
-
-    #[test]
-    fn what_needs_several_charts_is_refused_with_its_numbers() {
-        for soup in [shapes::sphere(5), shapes::bow_tie(), shapes::moebius(7)] {
-            let Err(Error::NeedsDecomposition(census)) = atlas(&soup) else { panic!("not one chart") };
-            assert!(!census.is_one_chart());
-        }
-        let message = atlas(&shapes::sphere(5)).expect_err("closed").to_string();
-        assert!(message.contains("1 components, genus 0, 0 boundary loops"), "{message}");
-    }
-}
+mod tests;

@@ -8,7 +8,8 @@ use crate::{decompose, repair, shapes};
 /// A chart with its feasible start and its harmonic map.
 fn prepared(soup: &TriangleSoup) -> (ClosedChart, Vec<GridPoint>, QuadraticMap) {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-    let chart = ClosedChart::new(&decompose(&mesh, &Default::default()).expect("one chart").charts()[0]);
+    let chart =
+        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
     let mut boundary = Boundary::circle(&chart, Mids::Arc);
     let linear = linear_map(&chart, &boundary).expect("maps");
     lower_ears(&chart, &linear, &mut boundary);

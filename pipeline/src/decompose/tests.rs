@@ -1,0 +1,179 @@
+use super::*;
+use crate::id::VertexId;
+use crate::mesh::TriangleSoup;
+use crate::{Order, finish_chart, map_or_split, repair, shapes};
+
+fn surface(soup: &TriangleSoup) -> SurfaceMesh {
+    repair(soup, &Default::default()).expect("a surface is left").mesh
+}
+
+fn smooth() -> Settings {
+    Settings { feature_angle: None, ..Settings::default() }
+}
+
+fn atlas(soup: &TriangleSoup, settings: &Settings) -> Atlas {
+    let mesh = surface(soup);
+    let atlas = decompose(&mesh, settings).expect("an atlas");
+    let mut faces: Vec<_> = atlas.charts().iter().flat_map(|c| c.faces().iter().copied()).collect();
+    faces.sort_unstable();
+    assert_eq!(
+        faces,
+        (0..mesh.triangles().len()).map(crate::id::FaceId::at).collect::<Vec<_>>(),
+        "every triangle once"
+    );
+    atlas
+}
+
+/// A cube of n x n squares per side.
+fn cube(n: u32) -> TriangleSoup {
+    let mut points = Vec::new();
+    let mut triangles = Vec::new();
+    for side in 0..6_usize {
+        let (axis, top) = (side / 2, side % 2 == 1);
+        let first = points.len() as u32;
+        for (i, j) in (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))) {
+            let mut p = [0.0; 3];
+            p[axis] = if top { 1.0 } else { 0.0 };
+            p[(axis + 1) % 3] = f64::from(i) / f64::from(n);
+            p[(axis + 2) % 3] = f64::from(j) / f64::from(n);
+            points.push(p);
+        }
+        for (i, j) in (0..n).flat_map(|j| (0..n).map(move |i| (i, j))) {
+            let a = first + j * (n + 1) + i;
+            let [b, c, d] = [a + 1, a + n + 2, a + n + 1];
+            triangles.extend(if top { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
+        }
+    }
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn a_disk_with_holes_is_one_legal_chart() {
+    let atlas = atlas(&shapes::disk_with_holes(17, 3), &Settings::default());
+    let chart = &atlas.charts()[0];
+    assert_eq!((atlas.charts().len(), chart.holes().len(), chart.outer().len()), (1, 3, 68));
+    let mut on_loops: Vec<VertexId> =
+        chart.holes().iter().flatten().chain(chart.outer()).map(|h| chart.from(*h)).collect();
+    let all = on_loops.len();
+    on_loops.sort_unstable();
+    on_loops.dedup();
+    assert_eq!(on_loops.len(), all, "loops are simple and share no vertex");
+    let chi = chart.vertices().len() as i64 - chart.edges().len() as i64 + chart.triangles().len() as i64;
+    assert_eq!((2 - 4 - chi) / 2, 0, "genus 0");
+    for l in chart.holes().iter().chain([&chart.outer().to_vec()]) {
+        for (i, h) in l.iter().enumerate() {
+            let next = l[(i + 1) % l.len()];
+            assert_eq!(chart.triangles()[h.face().index()][h.next().side()], chart.from(next));
+        }
+    }
+}
+
+#[test]
+fn closed_surfaces_need_two_charts_and_a_moebius_strip_as_many() {
+    for (soup, most) in [
+        (shapes::sphere(5), 2),
+        (shapes::sphere(20), 2),
+        (cube(8), 2),
+        (shapes::ring_torus(24, 12), 3),
+        (shapes::moebius(7), 2),
+        (shapes::bow_tie(), 2),
+    ] {
+        let charts = atlas(&soup, &smooth()).charts().len();
+        assert!((2..=most).contains(&charts), "{charts} charts, at most {most}");
+    }
+}
+
+#[test]
+fn features_part_the_sides_of_a_cube_but_noise_parts_nothing() {
+    let box_of_six = atlas(&cube(8), &Settings::default());
+    assert_eq!((box_of_six.charts().len(), box_of_six.feature_edges()), (6, 12 * 8));
+    // An angle above that of the edges finds none.
+    let blunt = Settings { feature_angle: Some(100.0), ..Settings::default() };
+    assert_eq!(atlas(&cube(8), &blunt).charts().len(), 2);
+    // Vertices pulled out of a fine disk make steep triangles, but separate nothing of any size.
+    let mut points = shapes::disk(60).points().to_vec();
+    points.iter_mut().step_by(37).for_each(|p| p[2] += 0.025);
+    let spiky = TriangleSoup::new(points, shapes::disk(60).triangles().to_vec()).expect("sound");
+    let whole = atlas(&spiky, &Settings::default());
+    assert_eq!((whole.charts().len(), whole.feature_edges()), (1, 0));
+}
+
+#[test]
+fn limits_are_kept() {
+    let torus = shapes::ring_torus(24, 12);
+    let strict = Settings { strict_disks: true, ..smooth() };
+    assert!(atlas(&torus, &strict).charts().iter().all(|c| c.holes().is_empty()), "disks only");
+    let holes = Settings { strict_disks: true, ..smooth() };
+    assert_eq!(
+        atlas(&shapes::disk_with_holes(17, 3), &holes).charts()[0].holes().len(),
+        3,
+        "those of the surface stay"
+    );
+    for most in [1, 50, 200] {
+        let small = Settings { max_triangles: most, ..smooth() };
+        let sizes: Vec<usize> = atlas(&torus, &small).charts().iter().map(|c| c.triangles().len()).collect();
+        assert!(sizes.iter().all(|s| *s <= most), "{sizes:?}");
+        assert!(most > 1 || sizes.len() == 24 * 12 * 2);
+    }
+}
+
+#[test]
+fn what_stretches_too_much_is_split_until_it_does_not() {
+    // A finger 22 times as long as wide: as one chart its area ratio is about e^88.
+    let mesh = surface(&shapes::finger(12, 22));
+    for max_area_ratio in [1e6, 1e3] {
+        let settings = Settings { max_area_ratio, ..smooth() };
+        let whole = assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk");
+        let chart = whole.into_charts().remove(0);
+        let parts = map_or_split(&mesh, chart, Order::Quadratic, &settings).expect("maps");
+        assert!(parts.len() > 2, "{}", parts.len());
+        assert_eq!(parts.iter().map(|(c, _)| c.triangles().len()).sum::<usize>(), mesh.triangles().len());
+        for (chart, mapped) in parts {
+            let done = finish_chart(mapped);
+            let ratio = crate::distortion::area_ratio(&chart, &done.certified);
+            assert!(ratio <= max_area_ratio, "{ratio} > {max_area_ratio}");
+        }
+    }
+}
+
+#[test]
+fn prediction_agrees_with_the_map_within_a_decade() {
+    // Fingers are tubes: e^(4 L/D).
+    for length in [1, 2, 3] {
+        let mesh = surface(&shapes::finger(16, length));
+        let dual = Dual::new(&mesh);
+        let limits = Limits::new(&smooth());
+        let cells = cells(&dual, &limits);
+        let mut network = network::Network::new(&dual, vec![0; mesh.triangles().len()], limits);
+        let predicted = judge::judge(&mut network, &cells)[0].expect("a chart").ratio;
+        let chart = assemble(&mesh, &network.labels).expect("a disk").into_charts().remove(0);
+        let done = finish_chart(crate::map_chart(&chart, Order::Linear).expect("maps"));
+        let measured = crate::distortion::area_ratio(&chart, &done.certified);
+        assert!((predicted / measured).log10().abs() < 1.0, "length {length}: {predicted:.1e}, {measured:.1e}");
+    }
+}
+
+#[test]
+fn illegal_charts_are_named() {
+    let sphere = surface(&shapes::sphere(5));
+    let labels = vec![0; sphere.triangles().len()];
+    assert!(matches!(assemble(&sphere, &labels), Err(Illegal::Topology { loops: 0, euler: 2, .. })));
+    let torus = surface(&shapes::ring_torus(12, 6));
+    let mut labels = vec![0; torus.triangles().len()];
+    labels[0] = 1;
+    assert!(matches!(assemble(&torus, &labels), Err(Illegal::Topology { loops: 1, euler: -1, .. })));
+    let disk = surface(&shapes::disk(6));
+    let far = disk.triangles().len() - 1;
+    let mut labels = vec![0; far + 1];
+    (labels[0], labels[far]) = (1, 1);
+    assert!(matches!(assemble(&disk, &labels), Err(Illegal::Apart { parts: 2, .. })));
+    // Two triangles that share a vertex only, and the rest around them.
+    let around: Vec<usize> = (0..=far).filter(|f| disk.triangles()[*f].contains(&disk.triangles()[0][0])).collect();
+    let apart = around
+        .iter()
+        .copied()
+        .find(|f| disk.triangles()[*f].iter().filter(|v| disk.triangles()[0].contains(v)).count() == 1);
+    let mut labels = vec![1; far + 1];
+    (labels[0], labels[apart.expect("one across")]) = (0, 0);
+    assert!(assemble(&disk, &labels).is_err());
+}
