@@ -260,7 +260,7 @@ fn stages(
     let atlas = decompose(&found.mesh, &settings.decompose()).map_err(internal)?;
     let feature_edges = atlas.feature_edges();
     report.decomposition = Some(Decomposition { feature_edges, ..Decomposition::default() });
-    let (mesh, atlas) = match split_ears(&found.mesh, &atlas).map_err(internal)? {
+    let (mesh, atlas) = match split_ears(&found.mesh, &atlas, settings.decompose().max_triangles).map_err(internal)? {
         Some(done) => {
             report.decomposition.iter_mut().for_each(|d| d.ears_split = done.split);
             (done.mesh, done.atlas)

@@ -40,20 +40,34 @@ fn refusals_say_where_and_what_to_do() {
     }
 }
 
-/// The triangles come in reverse order, behind one that repair drops: the refusal names a triangle of the file.
+/// As one chart, the area ratio of this finger would be e^88.
 #[test]
-fn a_chart_beyond_double_precision_is_refused_as_needing_a_split() {
+fn a_chart_beyond_double_precision_is_split_until_it_maps() {
     let finger = pipeline::shapes::finger(12, 22);
     let mut text: String = finger.points().iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
-    text += "f 1 1 2\n";
     text.extend(finger.triangles().iter().rev().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1)));
-    let (ended, report) = Out::new().run_bytes("finger.obj", text.as_bytes());
-    let reason = report.reason.expect("a reason");
-    assert_eq!((ended.code, reason.code), (Some(1), Code::NeedsSplit), "{}", reason.message);
-    let place = reason.place.expect("a place");
-    let triangle: usize = place.strip_prefix("triangle ").and_then(|t| t.parse().ok()).expect("a number");
-    assert!((1..=finger.triangles().len()).contains(&triangle), "{place}");
-    assert!(report.outputs.is_empty() && report.surface.is_some());
+    for limit in ["1e6", "100"] {
+        let (ended, report) = Out::new().run_bytes_with("finger.obj", text.as_bytes(), &["--max-area-ratio", limit]);
+        assert_eq!((ended.code, report.status), (Some(0), Status::Certified), "{}", ended.err);
+        let limit: f64 = limit.parse().expect("a number");
+        assert!(report.charts.len() > 2 && report.charts.iter().all(|c| c.distortion.area_ratio <= limit));
+    }
+}
+
+#[test]
+fn limits_of_charts_are_kept_and_told() {
+    let out = Out::new();
+    let args = ["--feature-angle", "off", "--strict-disks", "--max-triangles", "200"];
+    assert_eq!(out.run(&[&fixture("sphere.stl")], &args).code, Some(0));
+    let report = out.report("sphere.stl");
+    assert!(report.charts.len() >= 3 && report.charts.iter().all(|c| c.triangles <= 200 && c.loops == 1));
+    let settings = &report.settings;
+    assert_eq!((settings.feature_angle, settings.strict_disks, settings.max_triangles), (None, true, Some(200)));
+    for wrong in
+        [["--feature-angle", "180"], ["--max-area-ratio", "1"], ["--max-triangles", "0"], ["--feature-angle", "x"]]
+    {
+        assert_eq!(out.run(&[&fixture("sphere.stl")], &wrong).code, Some(2), "{wrong:?}");
+    }
 }
 
 #[test]
@@ -118,8 +132,11 @@ fn what_is_up_to_date_is_skipped_unless_forced_or_changed() {
     out.run(&[&disk], &["--order", "1"]);
     assert!(written() > linear, "a file is missing");
     // A refusal is remembered, too, with its exit code.
-    assert_eq!(out.run(&[&fixture("sphere.stl")], &[]).code, Some(1));
-    let again = out.run(&[&fixture("sphere.stl")], &[]);
+    let flat = tempfile::tempdir().expect("a folder");
+    let flat = flat.path().join("flat.obj");
+    std::fs::write(&flat, "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n").expect("written");
+    assert_eq!(out.run(&[&flat], &[]).code, Some(1));
+    let again = out.run(&[&flat], &[]);
     assert_eq!(again.code, Some(1));
     assert!(again.out.contains("refused (up to date)"), "{}", again.out);
 }
@@ -207,7 +224,9 @@ fn weld_decides_about_cracks() {
     let out = Out::new();
     assert_eq!(out.run(&[&fixture("cracked_patch.obj")], &[]).code, Some(0));
     assert_eq!(out.report("cracked_patch.obj").repairs.expect("repairs").cracks_closed, 8);
-    assert_eq!(out.run(&[&fixture("cracked_patch.obj")], &["--weld", "0"]).code, Some(1));
+    assert_eq!(out.report("cracked_patch.obj").charts.len(), 1);
+    assert_eq!(out.run(&[&fixture("cracked_patch.obj")], &["--weld", "0"]).code, Some(0));
+    assert_eq!(out.report("cracked_patch.obj").charts.len(), 2);
     let surface = out.report("cracked_patch.obj").surface.expect("a surface");
     assert_eq!(surface.repaired.counts.components, 2);
 }

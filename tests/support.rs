@@ -61,10 +61,15 @@ impl Out {
 
     /// Writes an input file beside the results and runs it.
     pub fn run_bytes(&self, name: &str, bytes: &[u8]) -> (Ended, Report) {
+        self.run_bytes_with(name, bytes, &[])
+    }
+
+    /// As [`Self::run_bytes`], with more arguments.
+    pub fn run_bytes_with(&self, name: &str, bytes: &[u8], extra: &[&str]) -> (Ended, Report) {
         let inputs = tempfile::tempdir().expect("a folder");
         let path = inputs.path().join(name);
         std::fs::write(&path, bytes).expect("written");
-        (self.run(&[&path], &[]), self.report(name))
+        (self.run(&[&path], extra), self.report(name))
     }
 
     /// The report of an input.

@@ -88,7 +88,7 @@ pub fn map_chart(chart: &Chart, order: Order) -> Result<MappedChart, MapError> {
     map_within(chart, order, f64::INFINITY)
 }
 
-/// As [`map_chart`], where the linear map's area ratio may not exceed `max_area_ratio`.
+/// As [`map_chart`], where the area ratio of neither map may exceed `max_area_ratio`.
 ///
 /// # Errors
 /// [`MapError`]: the chart must be split.
@@ -108,10 +108,18 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64) -> Result<Ma
         }
     }
     let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary));
+    if let Some(Ok(map)) = &harmonic
+        && max_area_ratio.is_finite()
+    {
+        let ratio = distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n]));
+        if ratio > max_area_ratio {
+            return Err(MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) });
+        }
+    }
     Ok(MappedChart { closed, linear, start, certified_start, harmonic })
 }
 
-/// The linear map may reach this share of the largest area ratio: the quadratic one differs a little.
+/// Maps may reach this share of the largest area ratio: untangling changes it a little.
 const MARGIN: f64 = 0.8;
 
 /// Maps `chart`, a part of `mesh`, and splits it where it cannot be mapped, or is more distorted than `settings` allow,

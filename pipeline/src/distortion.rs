@@ -6,6 +6,7 @@ use crate::atlas::Chart;
 use crate::bernstein::{self, ExactDet};
 use crate::certify::CertifiedMap;
 use crate::element;
+use crate::grid::GridPoint;
 use crate::mesh::Stars;
 
 /// The fields of one triangle.
@@ -99,12 +100,10 @@ pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summ
     Summary { conformal_median, conformal_p99, area_ratio: area_ratio(chart, map) }
 }
 
-/// Per vertex, the area scale of its star of two rings, with the area of its own star as weight.
-fn star_scales(chart: &Chart, map: &CertifiedMap) -> Vec<(f64, f64)> {
+/// Per vertex, the area scale of its star of two rings, with the area of its own star as weight; `plane` are the areas
+/// of the triangles in the plane.
+fn star_scales(chart: &Chart, plane: &[f64]) -> Vec<(f64, f64)> {
     let stars = Stars::new(chart.triangles(), chart.vertices().len());
-    let place = |n: u32| map.map().nodes[n as usize];
-    let plane: Vec<f64> =
-        map.map().cells.iter().map(|c| area_in_plane(&ExactDet::new(c.map(place)).coefficients())).collect();
     let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
     let two_rings = |v: usize| {
         let ring = stars.around(v).iter().flat_map(|f| chart.triangles()[*f as usize]);
@@ -113,21 +112,42 @@ fn star_scales(chart: &Chart, map: &CertifiedMap) -> Vec<(f64, f64)> {
         faces.dedup();
         let sum = |area: &[f64]| faces.iter().map(|f| area[*f as usize]).sum::<f64>();
         let weight = stars.around(v).iter().map(|f| space[*f as usize]).sum::<f64>();
-        (sum(&plane) / sum(&space), weight)
+        (sum(plane) / sum(&space), weight)
     };
     (0..chart.vertices().len()).map(two_rings).collect()
 }
 
 /// Per triangle, the logarithm of the area scale around it: the mean over its corners, each with its two rings.
 pub(crate) fn log_scales(chart: &Chart, map: &CertifiedMap) -> Vec<f64> {
-    let logs: Vec<f64> = star_scales(chart, map).into_iter().map(|(scale, _)| finite(scale).ln()).collect();
+    let logs: Vec<f64> =
+        star_scales(chart, &plane_areas(map)).into_iter().map(|(scale, _)| finite(scale).ln()).collect();
     chart.triangles().iter().map(|t| t.iter().map(|v| logs[v.index()]).sum::<f64>() / 3.0).collect()
 }
 
 /// The area ratio of a chart (see [`Summary::area_ratio`]).
 pub fn area_ratio(chart: &Chart, map: &CertifiedMap) -> f64 {
-    let [low, high] = quantiles(&mut star_scales(chart, map), [0.001, 0.999]);
+    ratio(star_scales(chart, &plane_areas(map)))
+}
+
+/// The area ratio of a map that may be invalid here and there, by the nodes of each triangle of the chart: stars whose
+/// area is not positive do not count.
+pub(crate) fn area_ratio_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [GridPoint; 6]) -> f64 {
+    let area = |f: usize| area_in_plane(&ExactDet::new(nodes(f)).coefficients());
+    let plane: Vec<f64> = (0..chart.triangles().len()).map(area).collect();
+    let mut scales = star_scales(chart, &plane);
+    scales.retain(|s| s.0 > 0.0);
+    ratio(scales)
+}
+
+fn ratio(mut scales: Vec<(f64, f64)>) -> f64 {
+    let [low, high] = quantiles(&mut scales, [0.001, 0.999]);
     finite(high / low)
+}
+
+/// Per triangle of a map its area in the plane.
+fn plane_areas(map: &CertifiedMap) -> Vec<f64> {
+    let place = |n: u32| map.map().nodes[n as usize];
+    map.map().cells.iter().map(|c| area_in_plane(&ExactDet::new(c.map(place)).coefficients())).collect()
 }
 
 /// The values at the given shares of the total weight.

@@ -23,16 +23,18 @@ pub struct WithoutEars {
 }
 
 /// Splits the ears of all charts of `atlas`; none where there are none to split. Ears that mollification alone keeps
-/// from being degenerate stay.
+/// from being degenerate stay, and those of charts that would get more than `max_triangles`.
 ///
 /// # Errors
 /// [`Illegal`]: a fault of planish.
-pub fn split_ears(mesh: &SurfaceMesh, atlas: &Atlas) -> Result<Option<WithoutEars>, Illegal> {
+pub fn split_ears(mesh: &SurfaceMesh, atlas: &Atlas, max_triangles: usize) -> Result<Option<WithoutEars>, Illegal> {
     let mut labels = vec![0; mesh.triangles().len()];
     for chart in atlas.charts() {
         chart.faces().iter().for_each(|f| labels[f.index()] = chart.id().0);
     }
-    let mut work = Work { mesh: mesh.clone(), labels, left_alone: vec![false; mesh.triangles().len()], split: 0 };
+    let sizes = atlas.charts().iter().map(|c| c.triangles().len()).collect();
+    let left_alone = vec![false; mesh.triangles().len()];
+    let mut work = Work { mesh: mesh.clone(), labels, sizes, max_triangles, left_alone, split: 0 };
     // A split ear is none any more, and its parts are none: every pass leaves fewer.
     while work.pass() {}
     if work.split == 0 {
@@ -54,6 +56,9 @@ pub fn split_ears(mesh: &SurfaceMesh, atlas: &Atlas) -> Result<Option<WithoutEar
 struct Work {
     mesh: SurfaceMesh,
     labels: Vec<u32>,
+    /// Per chart its triangles.
+    sizes: Vec<usize>,
+    max_triangles: usize,
     left_alone: Vec<bool>,
     split: usize,
 }
@@ -95,9 +100,11 @@ impl Work {
     fn halve_edge(&mut self, h: HalfEdgeId, t: HalfEdgeId) -> bool {
         let middle = VertexId::at(self.mesh.points.len());
         let parts = [h, t].map(|side| self.halves(side, middle));
-        if parts.iter().flatten().any(|(_, shape)| !(shape.area() > 0.0)) {
+        let size = self.sizes[self.labels[h.face().index()] as usize] + 2;
+        if size > self.max_triangles || parts.iter().flatten().any(|(_, shape)| !(shape.area() > 0.0)) {
             return false;
         }
+        self.sizes[self.labels[h.face().index()] as usize] = size;
         let [p, q] = [h, h.next()].map(|e| self.mesh.triangles[e.face().index()][e.side()].index());
         self.mesh.points.push(midpoint(self.mesh.points[p], self.mesh.points[q]));
         let fresh = self.mesh.welded.iter().max().map_or(0, |w| w + 1);
@@ -154,13 +161,13 @@ mod tests {
         for (n, ears) in [(1, 1), (2, 2), (5, 2)] {
             let mesh = repair(&square(n), &Default::default()).expect("a surface").mesh;
             let atlas = decompose(&mesh, &Default::default()).expect("one chart");
-            let done = split_ears(&mesh, &atlas).expect("legal").expect("ears");
+            let done = split_ears(&mesh, &atlas, usize::MAX).expect("legal").expect("ears");
             assert_eq!((done.split, done.mesh.points().len()), (ears, mesh.points().len() + ears));
             assert!((done.mesh.area() / mesh.area() - 1.0).abs() < 1e-14);
             let shapes = (0..done.mesh.triangles().len()).map(|f| done.mesh.metric().shapes[f].area());
             let scale = mesh.metric().scale;
             assert!((shapes.sum::<f64>() / scale / scale / mesh.area() - 1.0).abs() < 1e-7, "mollified all the same");
-            assert!(split_ears(&done.mesh, &done.atlas).expect("legal").is_none(), "no ear is left");
+            assert!(split_ears(&done.mesh, &done.atlas, usize::MAX).expect("legal").is_none(), "no ear is left");
             let chart = &done.atlas.charts()[0];
             let done = finish_chart(map_chart(chart, Order::Quadratic).expect("maps"));
             assert!(done.certified.certificate().det_lower_bound > 0.0);
