@@ -7,8 +7,10 @@
 //! The longest loop becomes the outer one (the first, in a tie): all others are holes.
 
 mod assemble;
+mod complex;
 mod dual;
 mod judge;
+mod ldl;
 mod legality;
 mod merge;
 mod network;
@@ -22,6 +24,7 @@ mod voronoi;
 use crate::atlas::Atlas;
 use crate::mesh::{Census, SurfaceMesh};
 pub use assemble::assemble;
+use complex::Complex;
 use dual::Dual;
 use judge::{Verdict, choose_outer, judge};
 pub use legality::Illegal;
@@ -82,16 +85,16 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
         triangles: settings.max_triangles,
         strict_disks: settings.strict_disks,
     };
-    let cells = cells(&dual, &limits);
-    let graph = CellGraph::new(&dual, &cells);
-    let charts = Search { dual: &dual, cells: &cells, graph: &graph, limits }.run();
+    let (cells, complex) = cells(&dual, &limits);
+    let graph = CellGraph::new(&complex);
+    let charts = Search { complex: &complex, graph: &graph, limits }.run();
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
     let mut network = Network::new(&dual, labels, limits);
-    let mut verdicts = judge(&mut network, &cells);
+    let mut verdicts = judge(&network, &cells);
     for band in BANDS {
         let mut straight = Network::new(&dual, network.labels.clone(), limits);
         straighten(&mut straight, |h| band * graph.area(cells.of[h.face().index()]).sqrt());
-        let found = judge(&mut straight, &cells);
+        let found = judge(&straight, &cells);
         let fits = |v: &Option<Verdict>| v.is_none_or(|v| v.ratio <= settings.max_area_ratio);
         if !straight.is_sound() || !found.iter().all(fits) {
             break;
@@ -103,15 +106,19 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
     Ok(atlas)
 }
 
-/// Legal cells of about the same size.
-fn cells(dual: &Dual, limits: &Limits) -> Cells {
+/// Legal cells of about the same size, and their complex.
+fn cells(dual: &Dual, limits: &Limits) -> (Cells, Complex) {
     let cells = farthest_first(dual, |_, size| (size / 8).min(CELLS));
-    let alone: Vec<u32> = (0..dual.mesh.triangles().len() as u32).collect();
-    bisect_until(dual, cells, |groups| {
-        let mut regions = Regions::new(dual, &alone, groups.of.clone(), groups.count);
-        let outlines: Vec<_> = (0..groups.count as u32).map(|r| regions.outline_of(r)).collect();
-        regions.all.iter().zip(&outlines).map(|(region, outline)| limits.allow(dual, region, outline)).collect()
-    })
+    let mut complex = Complex::default();
+    let cells = bisect_until(dual, cells, |cells| {
+        complex = Complex::new(dual, cells);
+        let alone = (0..cells.count as u32).collect();
+        let mut regions = Regions::new(&complex, alone, cells.count);
+        let outlines: Vec<_> = (0..cells.count as u32).map(|r| regions.outline_of(r)).collect();
+        let shapes = regions.all.iter().zip(&outlines).map(|(region, outline)| regions.shape(region, outline));
+        shapes.map(|shape| limits.allow(&shape)).collect()
+    });
+    (cells, complex)
 }
 
 /// Charts grow up to this share of the decades of the largest area ratio: the prediction is not exact, and straight
