@@ -28,7 +28,7 @@ pub(super) fn finish(
     size: impl Fn(HalfEdgeId) -> f64,
 ) -> Result<Atlas, Error> {
     let mut network = Network::new(dual, labels, limits);
-    let mut verdicts = judge(&mut network, cells);
+    let mut verdicts = judge(&network, cells);
     for band in BANDS {
         let mut held = vec![false; network.label_count()];
         for _ in 0..TRIES {
@@ -36,7 +36,7 @@ pub(super) fn finish(
             let holds = |h: HalfEdgeId| held[network.labels[h.face().index()] as usize];
             let free = |h: HalfEdgeId| !holds(h) && !dual.across(h).is_some_and(holds);
             straighten(&mut straight, |h| if free(h) { band * size(h) } else { 0.0 });
-            let found = judge(&mut straight, cells);
+            let found = judge(&straight, cells);
             let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
             let worse = |label: usize| ratio(&found[label]) > settings.max_area_ratio.max(ratio(&verdicts[label]));
             let bad: Vec<usize> = (0..held.len()).filter(|l| worse(*l)).collect();

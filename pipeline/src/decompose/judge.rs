@@ -4,8 +4,10 @@
 //! A tube that is open at both ends can be mapped from either; but where three tubes meet, or a tube widens, the choice
 //! decides. The cells are cut along the seams for this.
 
+use super::complex::Complex;
 use super::network::Network;
 use super::predict::{CellGraph, area_ratio};
+use super::regions::Regions;
 use super::voronoi::Cells;
 use crate::atlas::Atlas;
 use crate::id::HalfEdgeId;
@@ -19,25 +21,36 @@ pub(super) struct Verdict {
 }
 
 /// The prediction for every label (none for labels without triangles).
-pub(super) fn judge(network: &mut Network, cells: &Cells) -> Vec<Option<Verdict>> {
-    let charts = network.label_count();
-    let key = |f: usize| u64::from(network.labels[f]) << 32 | u64::from(cells.of[f]);
-    let mut pieces: Vec<u64> = (0..cells.of.len()).map(key).collect();
-    pieces.sort_unstable();
-    pieces.dedup();
-    let of = (0..cells.of.len()).map(|f| pieces.partition_point(|p| *p < key(f)) as u32).collect();
-    let cut = Cells { of, count: pieces.len() };
-    let graph = CellGraph::new(network.dual, &cut);
-    let dual = network.dual;
+pub(super) fn judge(network: &Network, cells: &Cells) -> Vec<Option<Verdict>> {
+    let (cut, labels) = cut(network, cells);
+    let complex = Complex::new(network.dual, &cut);
+    let graph = CellGraph::new(&complex);
+    let mut regions = Regions::new(&complex, labels, network.label_count());
     let verdict = |label: usize| {
-        let first = pieces.partition_point(|p| (*p >> 32) < label as u64) as u32;
-        let last = pieces.partition_point(|p| (*p >> 32) <= label as u64) as u32;
-        let own: Vec<u32> = (first..last).collect();
-        let loops = network.loops(label as u32);
-        let (ratio, outer) = area_ratio(dual, &cut.of, &graph, &own, &loops);
-        Some(Verdict { ratio, outer: *loops.get(outer)?.first()? })
+        let outline = regions.outline_of(label as u32);
+        let (ratio, outer) = area_ratio(&complex, &graph, &regions.all[label].cells, &outline.loops);
+        let arc = *outline.loops.get(outer)?.first()?;
+        Some(Verdict { ratio, outer: complex.arcs[arc as usize].first })
     };
-    (0..charts).map(verdict).collect()
+    (0..network.label_count()).map(verdict).collect()
+}
+
+/// The pieces into which labels cut the cells, and the label of each.
+fn cut(network: &Network, cells: &Cells) -> (Cells, Vec<u32>) {
+    let mut labels = Vec::new();
+    // Per cell its labels with their pieces: mostly one, and hardly ever more than three.
+    let mut known: Vec<Vec<(u32, u32)>> = vec![Vec::new(); cells.count];
+    let mut piece = |cell: u32, label: u32| {
+        let known = &mut known[cell as usize];
+        if let Some((_, piece)) = known.iter().find(|k| k.0 == label) {
+            return *piece;
+        }
+        labels.push(label);
+        known.push((label, labels.len() as u32 - 1));
+        labels.len() as u32 - 1
+    };
+    let of = cells.of.iter().zip(&network.labels).map(|(cell, label)| piece(*cell, *label)).collect();
+    (Cells { of, count: labels.len() }, labels)
 }
 
 /// Makes the predicted loops the outer ones.

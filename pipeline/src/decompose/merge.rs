@@ -1,9 +1,8 @@
 //! Growing charts: starting from a few dozen compact regions, the best pair of neighbours is united again and
 //! again, as long as unions are legal and not too distorted.
 
-use super::dual::Dual;
 use super::predict::{CellGraph, area_ratio};
-use super::regions::{Outline, Region, Regions, Union};
+use super::regions::{Regions, Shape, Union};
 use crate::space::norm;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -19,11 +18,8 @@ pub(super) struct Limits {
 
 impl Limits {
     /// Whether a region may be a chart, its distortion apart.
-    pub(super) fn allow(&self, dual: &Dual, region: &Region, outline: &Outline) -> bool {
-        let seams = |l: &&Vec<_>| l.iter().any(|h| dual.across(*h).is_some());
-        region.is_chart(outline)
-            && region.faces <= self.triangles
-            && (!self.strict_disks || outline.loops.iter().filter(seams).count() <= 1)
+    pub(super) fn allow(&self, shape: &Shape) -> bool {
+        shape.is_chart() && shape.faces <= self.triangles && (!self.strict_disks || shape.seam_loops <= 1)
     }
 }
 
@@ -121,22 +117,21 @@ impl Merge<'_, '_> {
         let cells_of = |r: u32| self.regions.all[r as usize].cells.iter().copied();
         let cells: Vec<u32> = cells_of(a).chain(cells_of(b)).collect();
         let loops = &union.outline.loops;
-        let (ratio, _) = area_ratio(self.regions.dual, self.regions.cell_of, self.graph, &cells, loops);
+        let (ratio, _) = area_ratio(self.regions.complex, self.graph, &cells, loops);
         let judged = Candidate { cost: self.cost((a, b), &union, ratio), ratio: Some(ratio), ..candidate };
         (ratio <= self.limits.area_ratio).then_some(judged)
     }
 
     /// Whether the union may be a chart, its distortion apart.
     fn is_allowed(&self, union: &Union) -> bool {
-        self.limits.allow(self.regions.dual, &union.region, &union.outline)
+        self.limits.allow(&self.regions.shape(&union.region, &union.outline))
             && 2.0 * union.shared_feature <= union.shared
     }
 
     fn cost(&self, (a, b): (u32, u32), union: &Union, ratio: f64) -> f64 {
-        let length = |boundary: &[_]| boundary.iter().map(|h| self.regions.dual.length(*h)).sum::<f64>();
-        let outline = |r: u32| length(&self.regions.all[r as usize].boundary);
+        let outline = |r: u32| self.regions.all[r as usize].length;
         let region = &union.region;
-        let excess = length(&region.boundary) / (4.0 * PI * region.area).sqrt() - 1.0;
+        let excess = region.length / (4.0 * PI * region.area).sqrt() - 1.0;
         let spread = 1.0 - norm(region.normal) / (2.0 * region.area);
         let w = &self.weights;
         w.ratio * ratio.log10() + w.roundness * excess.max(0.0) + w.spread * spread

@@ -17,11 +17,13 @@
 //! sorting, but for a fixed number of cells; every loop has its reason to end beside it.
 
 mod assemble;
+mod complex;
 mod dual;
 mod ears;
 mod features;
 mod finish;
 mod judge;
+mod ldl;
 mod legality;
 mod merge;
 mod network;
@@ -37,6 +39,7 @@ use crate::atlas::Atlas;
 use crate::id::HalfEdgeId;
 use crate::mesh::SurfaceMesh;
 pub use assemble::assemble;
+use complex::Complex;
 use dual::Dual;
 pub use ears::{WithoutEars, split_ears};
 use features::mark_features;
@@ -44,8 +47,8 @@ use finish::finish;
 pub use legality::Illegal;
 use merge::Limits;
 use predict::CellGraph;
-use regions::Regions;
 use search::Search;
+use split::legal;
 pub use split::split;
 use voronoi::{Cells, bisect_until, farthest_first};
 
@@ -86,9 +89,9 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
     let features = settings.feature_angle.map_or(0, |angle| mark_features(&mut dual, angle));
     let dual = dual;
     let limits = Limits::new(settings);
-    let cells = cells(&dual, &limits);
-    let graph = CellGraph::new(&dual, &cells);
-    let charts = Search { dual: &dual, cells: &cells, graph: &graph, limits }.run();
+    let (cells, complex) = cells(&dual, &limits);
+    let graph = CellGraph::new(&complex);
+    let charts = Search { complex: &complex, graph: &graph, limits, bound: settings.max_area_ratio }.run();
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
     let size = |h: HalfEdgeId| graph.area(cells.of[h.face().index()]).sqrt();
     let atlas = finish(&dual, labels, limits, settings, &cells, size)?;
@@ -105,15 +108,12 @@ impl Limits {
     }
 }
 
-/// Legal cells of about the same size.
-fn cells(dual: &Dual, limits: &Limits) -> Cells {
+/// Legal cells of about the same size, and their complex.
+fn cells(dual: &Dual, limits: &Limits) -> (Cells, Complex) {
     let cells = farthest_first(dual, |_, size| (size / 8).min(CELLS));
-    let alone: Vec<u32> = (0..dual.mesh.triangles().len() as u32).collect();
-    bisect_until(dual, cells, |groups| {
-        let mut regions = Regions::new(dual, &alone, groups.of.clone(), groups.count);
-        let outlines: Vec<_> = (0..groups.count as u32).map(|r| regions.outline_of(r)).collect();
-        regions.all.iter().zip(&outlines).map(|(region, outline)| limits.allow(dual, region, outline)).collect()
-    })
+    let cells = bisect_until(dual, cells, |cells| legal(dual, cells, limits));
+    let complex = Complex::new(dual, &cells);
+    (cells, complex)
 }
 
 /// Charts grow up to this share of the decades of the largest area ratio: the prediction is not exact, and straight

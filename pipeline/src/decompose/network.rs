@@ -5,7 +5,7 @@
 
 use super::dual::Dual;
 use super::merge::Limits;
-use super::regions::{Outline, Region};
+use super::regions::Shape;
 use crate::id::{FaceId, HalfEdgeId};
 use crate::union_find::UnionFind;
 
@@ -218,12 +218,6 @@ impl<'a> Network<'a> {
         self.sizes.len()
     }
 
-    /// The boundary loops of a chart.
-    pub(super) fn loops(&mut self, label: u32) -> Vec<Vec<HalfEdgeId>> {
-        let boundary = self.boundaries[label as usize].clone();
-        self.outline(label, &boundary).loops
-    }
-
     /// All seams: those between corners, then the closed ones.
     pub(super) fn curves(&self) -> Vec<Vec<HalfEdgeId>> {
         let mut seen = vec![false; self.dual.mesh.edges().len()];
@@ -349,12 +343,9 @@ impl<'a> Network<'a> {
     /// [`super::regions`]. (A label that falls apart and gets a handle at once would pass: see [`Self::is_sound`].)
     fn is_legal(&mut self, label: u32) -> bool {
         let boundary = std::mem::take(&mut self.boundaries[label as usize]);
-        let outline = self.outline(label, &boundary);
-        let (faces, inside) = (self.sizes[label as usize], self.inside[label as usize]);
-        let region = Region { faces, inside, boundary, ..Region::default() };
-        let legal = self.limits.allow(self.dual, &region, &outline);
-        self.boundaries[label as usize] = region.boundary;
-        legal
+        let shape = self.shape(label, &boundary);
+        self.boundaries[label as usize] = boundary;
+        self.limits.allow(&shape)
     }
 
     /// Brings the boundaries of charts up to date: what is none any more goes, what was laid comes.
@@ -388,31 +379,38 @@ impl<'a> Network<'a> {
         sets.labels().1 == self.charts()
     }
 
-    /// Walks along the boundary of a label. See [`super::regions`].
-    fn outline(&mut self, label: u32, boundary: &[HalfEdgeId]) -> Outline {
+    /// Walks along the boundary of a label. With I inner vertices, B boundary half-edges and F triangles the Euler
+    /// number (of the label opened where it only touches itself) is I + (B - F)/2.
+    fn shape(&mut self, label: u32, boundary: &[HalfEdgeId]) -> Shape {
         self.marks.now += 1;
         let now = self.marks.now;
-        let mut outline = Outline::default();
+        let (faces, inside) = (self.sizes[label as usize], self.inside[label as usize]);
+        let euler = inside as i64 + (boundary.len() as i64 - faces as i64) / 2;
+        let mut shape = Shape { faces, euler, loops: 0, seam_loops: 0, pinches: 0, meets_itself: false };
         for start in boundary {
-            let mut turn = Vec::new();
             let mut h = *start;
+            let (mut fresh, mut seam) = (false, false);
             while std::mem::replace(&mut self.marks.half_edges[h.index()], now) != now {
-                turn.push(h);
+                (fresh, seam) = (true, seam || self.dual.across(h).is_some());
                 let again = std::mem::replace(&mut self.marks.vertices[self.dual.from(h)], now) == now;
-                outline.pinches += usize::from(again);
+                shape.pinches += usize::from(again);
                 let beyond = self.dual.mesh.edges().twin(h).filter(|_| self.dual.across(h).is_none());
-                outline.meets_itself |= beyond.is_some_and(|t| self.label(t) == label);
-                let mut e = h.next();
-                while let Some(t) = self.dual.across(e).filter(|t| self.label(*t) == label) {
-                    e = t.next();
-                }
-                h = e;
+                shape.meets_itself |= beyond.is_some_and(|t| self.label(t) == label);
+                h = self.next(h, label);
             }
-            if !turn.is_empty() {
-                outline.loops.push(turn);
-            }
+            shape.loops += usize::from(fresh);
+            shape.seam_loops += usize::from(seam);
         }
-        outline
+        shape
+    }
+
+    /// The half-edge after `h` along the boundary of a label.
+    fn next(&self, h: HalfEdgeId, label: u32) -> HalfEdgeId {
+        let mut e = h.next();
+        while let Some(t) = self.dual.across(e).filter(|t| self.label(*t) == label) {
+            e = t.next();
+        }
+        e
     }
 }
 

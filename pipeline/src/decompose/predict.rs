@@ -5,11 +5,10 @@
 //! Inner loops are closed by one node each, as by a fan. Where a map is nearly conformal, its area scale is half the
 //! density of its Dirichlet energy; the ratio is that of the extreme quantiles of this density over stars of cells.
 
-use super::dual::Dual;
-use super::voronoi::{Cells, Graph};
-use crate::id::HalfEdgeId;
+use super::complex::{Complex, NONE};
+use super::ldl::Springs;
+use super::voronoi::Graph;
 use crate::space::{Vec3, distance};
-use crate::sparse::{PRESCRIBED, Pattern};
 use std::f64::consts::TAU;
 
 /// The graph of cells.
@@ -19,6 +18,8 @@ pub(super) struct CellGraph {
     areas: Vec<f64>,
     starts: Vec<u32>,
     links: Vec<Link>,
+    /// Per cell its place in an order that is good to eliminate cells in.
+    rank: Vec<u32>,
 }
 
 /// A cell beside another one.
@@ -32,30 +33,68 @@ struct Link {
 }
 
 impl CellGraph {
-    pub(super) fn new(dual: &Dual, cells: &Cells) -> Self {
-        let (mut centroids, mut areas) = (vec![[0.0; 3]; cells.count], vec![0.0; cells.count]);
-        for (f, cell) in cells.of.iter().enumerate() {
-            let (area, centroid) = (dual.area(f), dual.centroid(f));
-            areas[*cell as usize] += area;
-            (0..3).for_each(|k| centroids[*cell as usize][k] += area * centroid[k]);
-        }
-        centroids.iter_mut().zip(&areas).for_each(|(c, a)| *c = c.map(|x| x / a));
-        let cell = |h: HalfEdgeId| cells.of[h.face().index()];
-        let pairs = dual.half_edges().filter_map(|h| Some((cell(h), cell(dual.across(h)?), h)));
-        let mut pairs: Vec<_> = pairs.filter(|(a, b, _)| a != b).collect();
-        pairs.sort_unstable();
-        let mut graph = Self { centroids, areas, starts: vec![0; cells.count + 1], links: Vec::new() };
+    pub(super) fn new(complex: &Complex) -> Self {
+        let centroids: Vec<Vec3> = complex.cells.iter().map(|c| c.centroid).collect();
+        let areas = complex.cells.iter().map(|c| c.area).collect();
+        let count = complex.cells.len();
+        let mut graph = Self { centroids, areas, starts: vec![0; count + 1], links: Vec::new(), rank: Vec::new() };
+        let inner = complex.arcs.iter().filter(|a| a.twin != NONE);
+        let mut pairs: Vec<(u32, u32, f64, f64)> =
+            inner.map(|a| (a.cell, complex.arcs[a.twin as usize].cell, a.length, a.feature)).collect();
+        pairs.sort_unstable_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)).then(x.2.total_cmp(&y.2)));
         for run in pairs.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-            let (a, b, _) = run[0];
-            let length: f64 = run.iter().map(|(_, _, h)| dual.length(*h)).sum();
-            let sharp: f64 = run.iter().filter(|(_, _, h)| dual.is_feature(*h)).map(|(_, _, h)| dual.length(*h)).sum();
+            let (a, b, ..) = run[0];
+            let length: f64 = run.iter().map(|pair| pair.2).sum();
+            let sharp: f64 = run.iter().map(|pair| pair.3).sum();
             let distance = graph.spacing(a, b);
             let feature = 2.0 * sharp > length;
             graph.links.push(Link { to: b, conductance: length / distance, distance, feature });
             graph.starts[a as usize + 1] += 1;
         }
-        (0..cells.count).for_each(|c| graph.starts[c + 1] += graph.starts[c]);
+        (0..count).for_each(|c| graph.starts[c + 1] += graph.starts[c]);
+        graph.rank = graph.dissected();
         graph
+    }
+
+    /// Nested dissection (George 1973, doi 10.1137/0710032): first one half, then the other, then the cells of the
+    /// first one that touch the other; and so on in the halves. Ends as halves are smaller.
+    fn dissected(&self) -> Vec<u32> {
+        let count = self.areas.len();
+        let mut rank = vec![0; count];
+        let mut half = vec![usize::MAX; count];
+        // Parts yet to be ranked, with the rank after their last one.
+        let mut parts = vec![((0..count as u32).collect::<Vec<u32>>(), count as u32)];
+        let mut made = 0;
+        while let Some((mut part, end)) = parts.pop() {
+            if part.len() <= FEW {
+                part.iter().zip((0..end).rev()).for_each(|(c, r)| rank[*c as usize] = r);
+                continue;
+            }
+            self.sort_along_widest(&mut part);
+            let second = part.split_off(part.len() / 2);
+            made += 1;
+            second.iter().for_each(|c| half[*c as usize] = made);
+            let touches = |c: &u32| self.links(*c).iter().any(|l| half[l.to as usize] == made);
+            let (between, first): (Vec<u32>, Vec<u32>) = part.into_iter().partition(touches);
+            between.iter().zip((0..end).rev()).for_each(|(c, r)| rank[*c as usize] = r);
+            let end = end - between.len() as u32;
+            parts.push((first, end - second.len() as u32));
+            parts.push((second, end));
+        }
+        rank
+    }
+
+    /// Sorts cells along the axis in which their centroids spread most.
+    fn sort_along_widest(&self, part: &mut [u32]) {
+        let along = |c: u32, k: usize| self.centroids[c as usize][k];
+        let width = |k: usize| {
+            let range = part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| {
+                (low.min(along(*c, k)), high.max(along(*c, k)))
+            });
+            range.1 - range.0
+        };
+        let axis = (1..3).fold(0, |best, k| if width(k) > width(best) { k } else { best });
+        part.sort_unstable_by(|a, b| along(*a, axis).total_cmp(&along(*b, axis)).then(a.cmp(b)));
     }
 
     /// The distance of two centroids; never below a small share of the cells' size (folded cells).
@@ -86,8 +125,11 @@ impl Graph for CellGraph {
     }
 }
 
-/// A run of boundary half-edges of one cell.
-struct Arc {
+/// Parts of this many cells are not dissected.
+const FEW: usize = 6;
+
+/// A run of half-arcs of one cell along a loop.
+struct Run {
     cell: u32,
     length: f64,
     middle: Vec3,
@@ -96,25 +138,32 @@ struct Arc {
 }
 
 /// The runs of a loop.
-fn arcs(dual: &Dual, cell_of: &[u32], turn: &[HalfEdgeId]) -> Vec<Arc> {
-    let cell = |h: &HalfEdgeId| cell_of[h.face().index()];
-    let total: f64 = turn.iter().map(|h| dual.length(*h)).sum();
+fn runs(complex: &Complex, turn: &[u32]) -> Vec<Run> {
+    let arc = |a: &u32| &complex.arcs[*a as usize];
+    let total: f64 = turn.iter().map(|a| arc(a).length).sum();
     let mut travelled = 0.0;
-    let arc = |run: &[HalfEdgeId]| {
-        let length: f64 = run.iter().map(|h| dual.length(*h)).sum();
+    let run = |run: &[u32]| {
+        let length: f64 = run.iter().map(|a| arc(a).length).sum();
+        let mut left = 0.5 * length;
+        let half_way = run.iter().find(|a| {
+            left -= arc(a).length;
+            left <= 0.0
+        });
         let at = (travelled + 0.5 * length) / total;
         travelled += length;
-        Arc { cell: cell(&run[0]), length, middle: dual.middle(run[run.len() / 2]), at }
+        Run { cell: arc(&run[0]).cell, length, middle: arc(half_way.unwrap_or(&run[0])).middle, at }
     };
-    turn.chunk_by(|g, h| cell(g) == cell(h)).map(arc).collect()
+    turn.chunk_by(|a, b| arc(a).cell == arc(b).cell).map(run).collect()
 }
 
 /// The system of one union.
 struct System<'a> {
     graph: &'a CellGraph,
+    /// The cells in the order of their unknowns.
     cells: &'a [u32],
-    /// Per cell of the graph its unknown, or [`PRESCRIBED`].
-    number: Vec<u32>,
+    /// Per cell of the graph its unknown, or [`NONE`].
+    number: &'a [u32],
+    /// The places of cells, then those of the nodes that close inner loops.
     unknowns: usize,
     links: Vec<([u32; 2], f64)>,
     /// Unknown, conductance, place on the circle.
@@ -124,23 +173,21 @@ struct System<'a> {
 /// Loops shorter than this share of the longest are never the outer one.
 const LONG: f64 = 0.5;
 
-/// The area ratio of a harmonic map of `cells`, whose union has these loops, and the best choice of the outer one
-/// among the long ones. At least 1, infinite where there is no map in doubles.
-pub(super) fn area_ratio(
-    dual: &Dual,
-    cell_of: &[u32],
-    graph: &CellGraph,
-    cells: &[u32],
-    loops: &[Vec<HalfEdgeId>],
-) -> (f64, usize) {
-    let length = |l: &Vec<HalfEdgeId>| l.iter().map(|h| dual.length(*h)).sum::<f64>();
+/// The area ratio of a harmonic map of `cells`, whose union has these loops of half-arcs, and the best choice of the
+/// outer one among the long ones. At least 1, infinite where there is no map in doubles.
+pub(super) fn area_ratio(complex: &Complex, graph: &CellGraph, cells: &[u32], loops: &[Vec<u32>]) -> (f64, usize) {
+    let length = |l: &Vec<u32>| l.iter().map(|a| complex.arcs[*a as usize].length).sum::<f64>();
     let lengths: Vec<f64> = loops.iter().map(length).collect();
     let longest = lengths.iter().fold(0.0, |m, l| f64::max(m, *l));
-    let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| arcs(dual, cell_of, l)).collect();
+    let mut cells = cells.to_vec();
+    cells.sort_unstable_by_key(|c| graph.rank[*c as usize]);
+    let mut number = vec![NONE; graph.areas.len()];
+    cells.iter().zip(0..).for_each(|(c, i)| number[*c as usize] = i);
+    let runs: Vec<Vec<Run>> = loops.iter().map(|l| runs(complex, l)).collect();
     let with_outer = |outer: usize| {
-        let mut system = System::new(graph, cells);
-        for (i, arcs) in arcs.iter().enumerate() {
-            if i == outer { system.prescribe(arcs) } else { system.close(arcs, lengths[i] / TAU) }
+        let mut system = System::new(graph, &cells, &number);
+        for (i, runs) in runs.iter().enumerate() {
+            if i == outer { system.prescribe(runs) } else { system.close(runs, lengths[i] / TAU) }
         }
         system.solve().map_or(f64::INFINITY, |places| system.ratio(&places))
     };
@@ -150,14 +197,12 @@ pub(super) fn area_ratio(
 }
 
 impl<'a> System<'a> {
-    fn new(graph: &'a CellGraph, cells: &'a [u32]) -> Self {
-        let mut number = vec![PRESCRIBED; graph.areas.len()];
-        cells.iter().zip(0..).for_each(|(c, i)| number[*c as usize] = i);
+    fn new(graph: &'a CellGraph, cells: &'a [u32], number: &'a [u32]) -> Self {
         let mut links = Vec::new();
         for (c, i) in cells.iter().zip(0..) {
             for link in graph.links(*c) {
                 let j = number[link.to as usize];
-                if j != PRESCRIBED && i < j {
+                if j != NONE && i < j {
                     links.push(([i, j], link.conductance));
                 }
             }
@@ -165,55 +210,42 @@ impl<'a> System<'a> {
         Self { graph, cells, number, unknowns: cells.len(), links, rim: Vec::new() }
     }
 
-    /// From the middle of an arc to the centroid of its cell.
-    fn reach(&self, arc: &Arc) -> f64 {
-        let cell = arc.cell as usize;
-        distance(self.graph.centroids[cell], arc.middle).max(0.1 * self.graph.areas[cell].sqrt())
+    /// From the middle of a run to the centroid of its cell.
+    fn reach(&self, run: &Run) -> f64 {
+        let cell = run.cell as usize;
+        distance(self.graph.centroids[cell], run.middle).max(0.1 * self.graph.areas[cell].sqrt())
     }
 
     /// Holds the outer loop on the circle.
-    fn prescribe(&mut self, arcs: &[Arc]) {
-        for arc in arcs {
-            let (sin, cos) = (TAU * arc.at).sin_cos();
-            self.rim.push((self.number[arc.cell as usize], arc.length / self.reach(arc), [cos, sin]));
+    fn prescribe(&mut self, runs: &[Run]) {
+        for run in runs {
+            let (sin, cos) = (TAU * run.at).sin_cos();
+            self.rim.push((self.number[run.cell as usize], run.length / self.reach(run), [cos, sin]));
         }
     }
 
     /// Closes an inner loop by a node at this distance from it.
-    fn close(&mut self, arcs: &[Arc], radius: f64) {
+    fn close(&mut self, runs: &[Run], radius: f64) {
         let centre = self.unknowns as u32;
         self.unknowns += 1;
-        for arc in arcs {
-            let conductance = arc.length / (self.reach(arc) + radius);
-            self.links.push(([self.number[arc.cell as usize], centre], conductance));
+        for run in runs {
+            let conductance = run.length / (self.reach(run) + radius);
+            self.links.push(([self.number[run.cell as usize], centre], conductance));
         }
     }
 
-    fn solve(&self) -> Option<Vec<f64>> {
-        let n = self.unknowns;
-        let elements: Vec<[u32; 2]> = self.links.iter().map(|l| l.0).chain((0..n as u32).map(|i| [i, i])).collect();
-        let pattern = Pattern::new(n, &elements);
-        let mut values = pattern.zeros();
-        for (e, (_, w)) in self.links.iter().enumerate() {
-            pattern.add(&mut values, e, &[[*w, -w], [-w, *w]]);
-        }
-        let diagonal: Vec<usize> = pattern.diagonal().collect();
-        let mut rhs = vec![0.0; 2 * n];
-        for (i, w, place) in &self.rim {
-            values[diagonal[*i as usize]] += w;
-            rhs[*i as usize] += w * place[0];
-            rhs[n + *i as usize] += w * place[1];
-        }
-        pattern.analyse().ok()?.factorise(&values).ok()?.solve(&mut rhs, 2);
-        Some(rhs)
+    fn solve(&self) -> Option<Vec<[f64; 2]>> {
+        let mut springs = Springs::new(self.unknowns);
+        self.links.iter().for_each(|(pair, w)| springs.join(*pair, *w));
+        self.rim.iter().for_each(|(i, w, place)| springs.hold(*i, *w, *place));
+        springs.rest()
     }
 
     /// The ratio of the quantiles of the energy density.
-    fn ratio(&self, places: &[f64]) -> f64 {
-        let n = self.unknowns;
-        let place = |i: u32| [places[i as usize], places[n + i as usize]];
+    fn ratio(&self, places: &[[f64; 2]]) -> f64 {
+        let place = |i: u32| places[i as usize];
         let squared = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2);
-        let mut energy = vec![0.0; n];
+        let mut energy = vec![0.0; self.unknowns];
         for ([i, j], w) in &self.links {
             let half = 0.5 * w * squared(place(*i), place(*j));
             energy[*i as usize] += half;

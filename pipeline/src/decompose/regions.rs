@@ -1,12 +1,10 @@
 //! Regions: unions of cells on their way to charts, and what they would be if two of them were united.
 //!
-//! A region is known by its boundary half-edges and the number of vertices in its inside; everything that decides
-//! whether it is a chart follows from these: walking along the boundary counts its loops and the vertices it visits
-//! twice, and with I inner vertices, B boundary half-edges and F triangles the Euler number (of the region opened
-//! where it only touches itself) is I + (B - F)/2. So a union is judged at the cost of its boundary, not of its area.
+//! A region is known by its boundary half-arcs and its Euler number; everything that decides whether it is a chart
+//! follows from these: walking along the boundary counts its loops and the corners it visits twice. So a union is
+//! judged at the cost of its boundary, not of its area, and whatever the number of triangles.
 
-use super::dual::Dual;
-use crate::id::{FaceId, HalfEdgeId};
+use super::complex::{Complex, NONE};
 use crate::space::Vec3;
 
 /// What is known of a region.
@@ -14,10 +12,12 @@ use crate::space::Vec3;
 pub(super) struct Region {
     /// The cells in it; none: the region was united with another one.
     pub cells: Vec<u32>,
-    pub boundary: Vec<HalfEdgeId>,
+    /// The half-arcs around it, and their length.
+    pub boundary: Vec<u32>,
+    pub length: f64,
     pub faces: usize,
-    /// Vertices that the boundary does not visit.
-    pub inside: usize,
+    /// The Euler number of the region, opened where it only touches itself.
+    pub euler: i64,
     pub area: f64,
     /// The sum of the area vectors.
     pub normal: Vec3,
@@ -26,10 +26,22 @@ pub(super) struct Region {
 /// The boundary of a region, walked.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outline {
-    pub loops: Vec<Vec<HalfEdgeId>>,
+    pub loops: Vec<Vec<u32>>,
     /// How often it visits a vertex again.
     pub pinches: usize,
     /// Whether the region lies on both sides of an edge of its boundary: a surface that cannot be oriented there.
+    pub meets_itself: bool,
+}
+
+/// What decides whether a region is a chart.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shape {
+    pub faces: usize,
+    pub euler: i64,
+    pub loops: usize,
+    /// Loops with a seam.
+    pub seam_loops: usize,
+    pub pinches: usize,
     pub meets_itself: bool,
 }
 
@@ -43,10 +55,9 @@ pub(super) struct Union {
     pub shared_feature: f64,
 }
 
-/// A partition of the triangles into regions.
+/// A partition of the cells into regions.
 pub(super) struct Regions<'a> {
-    pub dual: &'a Dual<'a>,
-    pub cell_of: &'a [u32],
+    pub complex: &'a Complex,
     /// Per cell its region.
     pub of_cell: Vec<u32>,
     pub all: Vec<Region>,
@@ -56,149 +67,145 @@ pub(super) struct Regions<'a> {
 /// Marks that are cleared by counting on.
 struct Stamps {
     now: u32,
-    half_edges: Vec<u32>,
-    vertices: Vec<u32>,
-}
-
-impl Stamps {
-    fn clear(&mut self) {
-        self.now += 1;
-    }
+    arcs: Vec<u32>,
+    corners: Vec<u32>,
 }
 
 impl<'a> Regions<'a> {
     /// One region per group of cells: `of_cell` tells the group of each cell, of `count` groups.
-    pub(super) fn new(dual: &'a Dual<'a>, cell_of: &'a [u32], of_cell: Vec<u32>, count: usize) -> Self {
-        let stamps =
-            Stamps { now: 0, half_edges: vec![0; 3 * cell_of.len()], vertices: vec![0; dual.mesh.points().len()] };
-        let mut made = Self { dual, cell_of, of_cell, all: vec![Region::default(); count], stamps };
-        for cell in 0..made.of_cell.len() {
-            made.all[made.of_cell[cell] as usize].cells.push(cell as u32);
+    pub(super) fn new(complex: &'a Complex, of_cell: Vec<u32>, count: usize) -> Self {
+        let stamps = Stamps { now: 0, arcs: vec![0; complex.arcs.len()], corners: vec![0; complex.corners] };
+        let mut made = Self { complex, of_cell, all: vec![Region::default(); count], stamps };
+        for (c, cell) in complex.cells.iter().enumerate() {
+            let region = &mut made.all[made.of_cell[c] as usize];
+            region.cells.push(c as u32);
+            region.faces += cell.faces;
+            region.euler += cell.euler;
+            region.area += cell.area;
+            (0..3).for_each(|k| region.normal[k] += cell.normal[k]);
         }
-        let mut on_boundary = vec![false; dual.mesh.points().len()];
-        for h in dual.half_edges() {
-            let region = made.of(h.face());
-            if dual.across(h).is_none_or(|t| made.of(t.face()) != region) {
-                made.all[region as usize].boundary.push(h);
-                on_boundary[dual.from(h)] = true;
-                on_boundary[dual.to(h)] = true;
-            }
-        }
-        made.measure(&on_boundary);
+        made.bound();
         made
     }
 
-    fn measure(&mut self, on_boundary: &[bool]) {
-        let mut counted = on_boundary.to_vec();
-        for (f, t) in self.dual.mesh.triangles().iter().enumerate() {
-            let region = self.of(FaceId::at(f)) as usize;
-            let (area, normal) = (self.dual.area(f), self.dual.area_vector(f));
-            let fresh = t.iter().filter(|v| !std::mem::replace(&mut counted[v.index()], true)).count();
-            let region = &mut self.all[region];
-            region.faces += 1;
-            region.area += area;
-            region.inside += fresh;
-            (0..3).for_each(|k| region.normal[k] += normal[k]);
+    /// Finds the boundaries; arcs and corners inside count for the Euler numbers.
+    fn bound(&mut self) {
+        let mut counted = vec![false; self.complex.corners];
+        let all = 0..self.complex.arcs.len() as u32;
+        let (outer, inner): (Vec<u32>, Vec<u32>) = all.partition(|a| self.beyond(*a) != Some(self.of(*a)));
+        for arc in outer {
+            let region = self.of(arc) as usize;
+            counted[self.complex.arcs[arc as usize].from as usize] = true;
+            self.all[region].length += self.complex.arcs[arc as usize].length;
+            self.all[region].boundary.push(arc);
+        }
+        for arc in inner {
+            let half = &self.complex.arcs[arc as usize];
+            let closed = !std::mem::replace(&mut counted[half.from as usize], true);
+            let region = self.of(arc) as usize;
+            self.all[region].euler += i64::from(closed) - i64::from(arc < half.twin);
         }
     }
 
-    /// The region of a face.
-    pub(super) fn of(&self, face: FaceId) -> u32 {
-        self.of_cell[self.cell_of[face.index()] as usize]
+    /// The region of a half-arc.
+    fn of(&self, arc: u32) -> u32 {
+        self.of_cell[self.complex.arcs[arc as usize].cell as usize]
+    }
+
+    /// The region on the other side of a half-arc.
+    fn beyond(&self, arc: u32) -> Option<u32> {
+        self.twin(arc).map(|t| self.of(t))
+    }
+
+    fn twin(&self, arc: u32) -> Option<u32> {
+        Some(self.complex.arcs[arc as usize].twin).filter(|t| *t != NONE)
     }
 
     /// The regions beside `region`, ascending.
     pub(super) fn neighbours(&self, region: u32) -> Vec<u32> {
-        let beside = |h: &HalfEdgeId| self.dual.across(*h).map(|t| self.of(t.face()));
-        let mut all: Vec<u32> = self.all[region as usize].boundary.iter().filter_map(beside).collect();
+        let mut all: Vec<u32> = self.all[region as usize].boundary.iter().filter_map(|a| self.beyond(*a)).collect();
         all.sort_unstable();
         all.dedup();
         all
     }
 
-    /// Walks along the boundary of the union of `a` and `b`, whose boundary half-edges are given.
-    fn outline(&mut self, a: u32, b: u32, boundary: &[HalfEdgeId]) -> Outline {
-        self.stamps.clear();
+    /// Walks along the boundary of the union of `a` and `b`, whose boundary half-arcs are given.
+    fn outline(&mut self, a: u32, b: u32, boundary: &[u32]) -> Outline {
+        self.stamps.now += 1;
         let now = self.stamps.now;
         let mut outline = Outline::default();
         for start in boundary {
-            if self.stamps.half_edges[start.index()] == now {
-                continue;
-            }
             let mut turn = Vec::new();
-            let mut h = *start;
-            // The next boundary half-edge is unique, and so is the one before: the walk closes where it began.
-            while std::mem::replace(&mut self.stamps.half_edges[h.index()], now) != now {
-                turn.push(h);
-                let again = std::mem::replace(&mut self.stamps.vertices[self.dual.from(h)], now) == now;
+            let mut arc = *start;
+            // The next boundary half-arc is unique, and so is the one before: the walk closes where it began.
+            while std::mem::replace(&mut self.stamps.arcs[arc as usize], now) != now {
+                turn.push(arc);
+                let half = &self.complex.arcs[arc as usize];
+                let again = std::mem::replace(&mut self.stamps.corners[half.from as usize], now) == now;
                 outline.pinches += usize::from(again);
-                outline.meets_itself |= self.faces_itself(a, b, h);
-                h = self.next(a, b, h);
+                outline.meets_itself |= half.foe != NONE && [a, b].contains(&self.of_cell[half.foe as usize]);
+                arc = self.next(a, b, arc);
             }
-            outline.loops.push(turn);
+            if !turn.is_empty() {
+                outline.loops.push(turn);
+            }
         }
         outline
     }
 
-    /// Whether the triangle on the other side of a boundary half-edge belongs to the union all the same.
-    fn faces_itself(&self, a: u32, b: u32, h: HalfEdgeId) -> bool {
-        let twin = self.dual.mesh.edges().twin(h).filter(|_| self.dual.across(h).is_none());
-        twin.is_some_and(|t| self.is_in(a, b, t))
+    /// The other side of a half-arc, if it belongs to `a` or `b`.
+    fn inner_twin(&self, a: u32, b: u32, arc: u32) -> Option<u32> {
+        self.twin(arc).filter(|t| [a, b].contains(&self.of(*t)))
     }
 
-    fn is_in(&self, a: u32, b: u32, h: HalfEdgeId) -> bool {
-        let region = self.of(h.face());
-        region == a || region == b
-    }
-
-    /// The boundary half-edge of the union of `a` and `b` after `h`: turns around the end of `h` until the union ends.
-    /// It does end, at the latest at `h` itself.
-    fn next(&self, a: u32, b: u32, h: HalfEdgeId) -> HalfEdgeId {
-        let mut e = h.next();
-        while let Some(t) = self.dual.across(e).filter(|t| self.is_in(a, b, *t)) {
-            e = t.next();
+    /// The boundary half-arc of the union of `a` and `b` after `arc`: turns around its end until the union ends. It
+    /// does end, at the latest at `arc` itself.
+    fn next(&self, a: u32, b: u32, arc: u32) -> u32 {
+        let mut e = self.complex.arcs[arc as usize].next;
+        while let Some(t) = self.inner_twin(a, b, e) {
+            e = self.complex.arcs[t as usize].next;
         }
         e
     }
 
-    /// Whether the end of `h`, which runs between `a` and `b`, comes to lie inside the union, and `h` is the least
-    /// half-edge of `a` that runs to it along `b`.
-    fn closes_vertex(&self, a: u32, b: u32, h: HalfEdgeId) -> bool {
-        let first = h.next();
+    /// Whether the end of `arc`, which runs between `a` and `b`, comes to lie inside the union, and `arc` is the least
+    /// half-arc of `a` that runs to it along `b`.
+    fn closes_corner(&self, a: u32, b: u32, arc: u32) -> bool {
+        let first = self.complex.arcs[arc as usize].next;
         let mut e = first;
         loop {
-            let Some(t) = self.dual.across(e).filter(|t| self.is_in(a, b, *t)) else { return false };
-            // t runs to the vertex.
-            if self.of(t.face()) == a && self.of(e.face()) == b && t < h {
+            let Some(t) = self.inner_twin(a, b, e) else { return false };
+            // t runs to the corner.
+            if self.of(t) == a && self.of(e) == b && t < arc {
                 return false;
             }
-            e = t.next();
+            e = self.complex.arcs[t as usize].next;
             if e == first {
                 return true;
             }
         }
     }
 
-    /// What the union of `a` and `b` would be; none where they share no edge.
+    /// What the union of `a` and `b` would be; none where they share no arc.
     pub(super) fn union(&mut self, a: u32, b: u32) -> Option<Union> {
         let (ra, rb) = (&self.all[a as usize], &self.all[b as usize]);
-        let to = |h: &HalfEdgeId, other: u32| self.dual.across(*h).is_some_and(|t| self.of(t.face()) == other);
-        let (gone, mut boundary): (Vec<HalfEdgeId>, Vec<HalfEdgeId>) = ra.boundary.iter().partition(|h| to(h, b));
+        let (gone, mut boundary): (Vec<u32>, Vec<u32>) = ra.boundary.iter().partition(|h| self.beyond(**h) == Some(b));
         if gone.is_empty() {
             return None;
         }
-        boundary.extend(rb.boundary.iter().filter(|h| !to(h, a)));
-        let closed = gone.iter().filter(|h| self.closes_vertex(a, b, **h)).count();
+        boundary.extend(rb.boundary.iter().filter(|h| self.beyond(**h) != Some(a)));
+        let closed = gone.iter().filter(|h| self.closes_corner(a, b, **h)).count();
+        let shared = gone.iter().map(|h| self.complex.arcs[*h as usize].length).sum();
+        let shared_feature = gone.iter().map(|h| self.complex.arcs[*h as usize].feature).sum();
         let mut region = Region {
             cells: vec![],
+            length: ra.length + rb.length - 2.0 * shared,
             faces: ra.faces + rb.faces,
-            inside: ra.inside + rb.inside + closed,
+            euler: ra.euler + rb.euler - gone.len() as i64 + closed as i64,
             area: ra.area + rb.area,
             normal: [0, 1, 2].map(|k| ra.normal[k] + rb.normal[k]),
             boundary: vec![],
         };
-        let shared = gone.iter().map(|h| self.dual.length(*h)).sum();
-        let shared_feature = gone.iter().filter(|h| self.dual.is_feature(**h)).map(|h| self.dual.length(*h)).sum();
         let outline = self.outline(a, b, &boundary);
         region.boundary = boundary;
         Some(Union { region, outline, shared, shared_feature })
@@ -215,18 +222,29 @@ impl<'a> Regions<'a> {
 
     /// The outline of a region.
     pub(super) fn outline_of(&mut self, region: u32) -> Outline {
-        let boundary = self.all[region as usize].boundary.clone();
-        self.outline(region, region, &boundary)
+        let boundary = std::mem::take(&mut self.all[region as usize].boundary);
+        let outline = self.outline(region, region, &boundary);
+        self.all[region as usize].boundary = boundary;
+        outline
+    }
+
+    /// What decides whether a region with this outline is a chart.
+    pub(super) fn shape(&self, region: &Region, outline: &Outline) -> Shape {
+        let seam = |l: &&Vec<u32>| l.iter().any(|a| self.twin(*a).is_some());
+        Shape {
+            faces: region.faces,
+            euler: region.euler,
+            loops: outline.loops.len(),
+            seam_loops: outline.loops.iter().filter(seam).count(),
+            pinches: outline.pinches,
+            meets_itself: outline.meets_itself,
+        }
     }
 }
 
-impl Region {
-    /// Whether the region is a disk with or without holes, whose boundary visits no vertex twice.
-    pub(super) fn is_chart(&self, outline: &Outline) -> bool {
-        let euler = self.inside as i64 + (self.boundary.len() as i64 - self.faces as i64) / 2;
-        outline.pinches == 0
-            && !outline.loops.is_empty()
-            && euler + outline.loops.len() as i64 == 2
-            && !outline.meets_itself
+impl Shape {
+    /// Whether it is a disk with or without holes, whose boundary visits no vertex twice.
+    pub(super) fn is_chart(&self) -> bool {
+        self.pinches == 0 && self.loops > 0 && self.euler + self.loops as i64 == 2 && !self.meets_itself
     }
 }

@@ -4,7 +4,7 @@
 //! done from several numbers of regions and with several weights. Fewer charts win; then short seams and a small area
 //! ratio. A component that can be one chart is left whole.
 
-use super::dual::Dual;
+use super::complex::{Complex, NONE};
 use super::merge::{Limits, Merge, Weights};
 use super::predict::{CellGraph, area_ratio};
 use super::regions::{Outline, Region, Regions};
@@ -24,11 +24,15 @@ const SEAMS: f64 = 0.65;
 
 /// The surface as the search sees it.
 pub(super) struct Search<'a> {
-    pub dual: &'a Dual<'a>,
-    pub cells: &'a Cells,
+    pub complex: &'a Complex,
     pub graph: &'a CellGraph,
     pub limits: Limits,
+    /// The largest area ratio of a chart.
+    pub bound: f64,
 }
+
+/// A component is left whole up to this share of the largest area ratio: it has no seams that would change it.
+const WHOLE: f64 = 0.5;
 
 /// What became of the component in one of the ways; less is better.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
@@ -41,8 +45,8 @@ impl Search<'_> {
     /// Per cell its chart.
     pub(super) fn run(&self) -> Cells {
         let components = farthest_first(self.graph, |_, _| 1);
-        let whole = Regions::new(self.dual, &self.cells.of, components.of.clone(), components.count);
-        let whole = self.fine(whole);
+        let whole = Regions::new(self.complex, components.of.clone(), components.count);
+        let whole = self.fine(whole, WHOLE * self.bound);
         let mut best: Vec<(Score, usize)> = whole.iter().map(|w| (Score::of_whole(*w), 0)).collect();
         let mut ways = vec![components.of.clone()];
         for (count, weights) in WAYS.iter().filter(|_| whole.contains(&false)) {
@@ -55,19 +59,18 @@ impl Search<'_> {
             ways.push(of);
         }
         // Charts of different ways have different numbers.
-        let span = self.cells.count as u32;
+        let span = self.complex.cells.len() as u32;
         let chosen = |cell: usize| best[components.of[cell] as usize].1;
-        let of = (0..self.cells.count).map(|c| chosen(c) as u32 * span + ways[chosen(c)][c]).collect();
+        let of = (0..self.complex.cells.len()).map(|c| chosen(c) as u32 * span + ways[chosen(c)][c]).collect();
         Cells::renumbered(of)
     }
 
-    /// Per region, whether it may be a chart.
-    fn fine(&self, mut regions: Regions) -> Vec<bool> {
+    /// Per region, whether it may be a chart with at most this area ratio.
+    fn fine(&self, mut regions: Regions, largest: f64) -> Vec<bool> {
         let outlines: Vec<_> = (0..regions.all.len() as u32).map(|r| regions.outline_of(r)).collect();
         let judge = |(region, outline): (&Region, &Outline)| {
-            let ratio = || area_ratio(self.dual, &self.cells.of, self.graph, &region.cells, &outline.loops).0;
-            self.limits.allow(self.dual, region, outline)
-                && (region.cells.len() == 1 || ratio() <= self.limits.area_ratio)
+            let ratio = || area_ratio(self.complex, self.graph, &region.cells, &outline.loops).0;
+            self.limits.allow(&regions.shape(region, outline)) && (region.cells.len() == 1 || ratio() <= largest)
         };
         regions.all.iter().zip(&outlines).map(judge).collect()
     }
@@ -77,9 +80,9 @@ impl Search<'_> {
         let is_whole = |cell: usize| whole[components.of[cell] as usize];
         let groups = farthest_first(self.graph, |cell, _| if is_whole(cell) { 1 } else { count });
         let groups = bisect_until(self.graph, groups, |groups| {
-            self.fine(Regions::new(self.dual, &self.cells.of, groups.of.clone(), groups.count))
+            self.fine(Regions::new(self.complex, groups.of.clone(), groups.count), self.limits.area_ratio)
         });
-        let mut regions = Regions::new(self.dual, &self.cells.of, groups.of, groups.count);
+        let mut regions = Regions::new(self.complex, groups.of, groups.count);
         let ratios = vec![1.0; groups.count];
         let mut merge = Merge { regions: &mut regions, graph: self.graph, limits: self.limits, weights, ratios };
         merge.run();
@@ -87,9 +90,9 @@ impl Search<'_> {
         let mut sums = vec![(0, 0.0, 0.0, 1.0_f64); components.count];
         for (region, ratio) in regions.all.iter().zip(&ratios).filter(|(r, _)| !r.cells.is_empty()) {
             let (charts, seams, area, worst) = &mut sums[components.of[region.cells[0] as usize] as usize];
-            let seam = region.boundary.iter().filter(|h| self.dual.across(**h).is_some());
+            let seam = region.boundary.iter().map(|a| &self.complex.arcs[*a as usize]).filter(|a| a.twin != NONE);
             *charts += 1;
-            *seams += 0.5 * seam.map(|h| self.dual.length(*h)).sum::<f64>();
+            *seams += 0.5 * seam.map(|a| a.length).sum::<f64>();
             *area += region.area;
             *worst = worst.max(*ratio);
         }

@@ -25,46 +25,66 @@ pub(super) fn reversed(dual: &Dual, path: &[HalfEdgeId]) -> Vec<HalfEdgeId> {
     path.iter().rev().filter_map(|h| dual.across(*h)).collect()
 }
 
+/// What the search knows of a vertex.
+#[derive(Clone, Copy)]
+struct Reached {
+    stamp: u32,
+    via: HalfEdgeId,
+    distance: f64,
+}
+
 /// A tree of shortest paths, of vertices that were reached.
 pub(super) struct Tree {
     from: usize,
     now: u32,
-    stamp: Vec<u32>,
-    distance: Vec<f64>,
-    via: Vec<HalfEdgeId>,
-    pub reached: Vec<usize>,
+    known: Vec<Reached>,
+    heap: BinaryHeap<At>,
+    /// The straight distance times this never exceeds the length of a path.
+    floor: f64,
+    /// The vertices in the order in which they were settled.
+    pub settled: Vec<usize>,
+}
+
+/// What paths are sought for.
+#[derive(Clone, Copy)]
+pub(super) enum Goal {
+    /// This vertex.
+    Vertex(usize),
+    /// The nearest vertex of the open loop through this one.
+    OpenLoop(usize),
+    /// The place where the paths from the root and from two more vertices meet; none is known before all are grown.
+    Meeting([usize; 2]),
 }
 
 /// Where paths may go.
 #[derive(Clone, Copy)]
 pub(super) struct Bounds<'a> {
+    pub goal: Goal,
     /// Through the inside of these charts, touching no seam.
     pub labels: &'a [u32],
-    /// No further than this.
+    /// No further than this (where three paths meet: all of them together).
     pub length: f64,
-    /// To this vertex, if to one; else everywhere.
-    pub target: Option<usize>,
-    /// Whether paths may end at the open boundary.
-    pub to_open: bool,
     /// Through these vertices.
     pub band: &'a [bool],
 }
 
 impl Tree {
-    pub(super) fn new(vertices: usize) -> Self {
+    pub(super) fn new(dual: &Dual) -> Self {
+        let unknown = Reached { stamp: 0, via: HalfEdgeId(0), distance: 0.0 };
         Self {
             from: 0,
             now: 0,
-            stamp: vec![0; vertices],
-            distance: vec![0.0; vertices],
-            via: vec![HalfEdgeId(0); vertices],
-            reached: Vec::new(),
+            known: vec![unknown; dual.mesh.points().len()],
+            heap: BinaryHeap::new(),
+            floor: if dual.feature.contains(&true) { FEATURE } else { 1.0 },
+            settled: Vec::new(),
         }
     }
 
     /// The distance of a vertex, if it was reached.
     pub(super) fn distance(&self, vertex: usize) -> Option<f64> {
-        (self.stamp[vertex] == self.now).then(|| self.distance[vertex])
+        let known = &self.known[vertex];
+        (known.stamp == self.now).then_some(known.distance)
     }
 
     /// The path from the root to a vertex that was reached.
@@ -72,61 +92,91 @@ impl Tree {
         let mut path = Vec::new();
         let mut at = vertex;
         while at != self.from {
-            path.push(self.via[at]);
-            at = dual.from(self.via[at]);
+            path.push(self.known[at].via);
+            at = dual.from(self.known[at].via);
         }
         path.reverse();
         path
     }
 
-    /// Grows the tree from `from`: Dijkstra, with the straight distance to the target as what is left (A*: Hart,
-    /// Nilsson and Raphael 1968, doi 10.1109/TSSC.1968.300136). Ends because distances only fall.
+    /// Grows the tree from `from`: Dijkstra, ordered by the distance with a bound for what is left (A*: Hart, Nilsson
+    /// and Raphael 1968, doi 10.1109/TSSC.1968.300136). Ends because distances only fall.
     pub(super) fn grow(&mut self, network: &Network, from: usize, bounds: &Bounds) {
         let dual = network.dual;
+        let mut heap = std::mem::take(&mut self.heap);
+        let plain = self.floor == 1.0;
         self.now += 1;
         self.from = from;
-        self.reached.clear();
-        let left = |v: usize| bounds.target.map_or(0.0, |t| FEATURE_FLOOR * distance(dual.point(v), dual.point(t)));
-        let mut heap = BinaryHeap::from([At { distance: left(from), node: from as u32 }]);
-        (self.stamp[from], self.distance[from]) = (self.now, 0.0);
+        self.settled.clear();
+        heap.clear();
+        heap.push(At { distance: self.left(dual, bounds, from), node: from as u32 });
+        self.known[from] = Reached { stamp: self.now, via: HalfEdgeId(0), distance: 0.0 };
         while let Some(At { distance: sum, node }) = heap.pop() {
             let node = node as usize;
-            let so_far = self.distance[node];
-            if sum > so_far + left(node) {
+            let so_far = self.known[node].distance;
+            if sum > so_far + self.left(dual, bounds, node) {
                 continue;
             }
-            self.reached.push(node);
-            if bounds.target == Some(node) {
-                return;
-            }
-            if node != from && network.is_open(node) {
+            self.settled.push(node);
+            if node != from && (bounds.goal.is_at(network, node) || network.is_open(node)) {
+                if bounds.goal.is_at(network, node) {
+                    break;
+                }
                 continue;
             }
             network.each_out(node, |h| {
                 let to = dual.to(h);
-                let length = so_far + weight(dual, h);
-                let known = self.stamp[to] == self.now && self.distance[to] <= length;
-                if known || length + left(to) > bounds.length || !bounds.admit(network, h, to) {
+                let distance = so_far + if plain { dual.length(h) } else { weight(dual, h) };
+                let known = &self.known[to];
+                if known.stamp == self.now && known.distance <= distance || !bounds.admit(network, h, to, node == from)
+                {
                     return;
                 }
-                (self.stamp[to], self.distance[to], self.via[to]) = (self.now, length, h);
-                heap.push(At { distance: length + left(to), node: to as u32 });
+                let sum = distance + self.left(dual, bounds, to);
+                if sum <= bounds.length {
+                    self.known[to] = Reached { stamp: self.now, via: h, distance };
+                    heap.push(At { distance: sum, node: to as u32 });
+                }
             });
+        }
+        self.heap = heap;
+    }
+
+    /// What a path through `vertex` still needs at least. It never falls by more than the length of an edge, so that
+    /// vertices are settled at their distances. Three points are not joined by less than half of their triangle.
+    fn left(&self, dual: &Dual, bounds: &Bounds, vertex: usize) -> f64 {
+        let apart = |a: usize, b: usize| distance(dual.point(a), dual.point(b));
+        self.floor
+            * match bounds.goal {
+                Goal::Vertex(v) => apart(vertex, v),
+                Goal::OpenLoop(_) => 0.0,
+                Goal::Meeting([a, b]) => 0.5 * (apart(vertex, a) + apart(vertex, b) + apart(a, b)),
+            }
+    }
+}
+
+impl Goal {
+    fn is_at(&self, network: &Network, vertex: usize) -> bool {
+        match self {
+            Goal::Vertex(v) => vertex == *v,
+            Goal::OpenLoop(v) => network.on_one_loop(vertex, *v),
+            Goal::Meeting(_) => false,
         }
     }
 }
 
-/// The straight distance times this never exceeds the length of a path.
-const FEATURE_FLOOR: f64 = FEATURE;
-
 impl Bounds<'_> {
-    /// Whether a path may go along `h` to the vertex `to`.
-    fn admit(&self, network: &Network, h: HalfEdgeId, to: usize) -> bool {
+    /// Whether a path may go along `h` to the vertex `to`. Around a vertex that no seam touches nothing but the given
+    /// charts is found: so labels are only asked for at the root.
+    fn admit(&self, network: &Network, h: HalfEdgeId, to: usize, at_root: bool) -> bool {
         let inside = |h: HalfEdgeId| self.labels.contains(&network.label(h));
-        let free = network.degree(to) == 0 && (self.to_open || !network.is_open(to));
-        (free && self.band[to] || self.target == Some(to))
-            && !network.is_seam(h)
-            && inside(h)
-            && network.dual.across(h).is_some_and(inside)
+        let may_end = |v: usize| match self.goal {
+            Goal::Vertex(target) => v == target,
+            Goal::OpenLoop(_) => network.degree(v) == 0 && self.band[v],
+            Goal::Meeting(_) => false,
+        };
+        let free = network.degree(to) == 0 && self.band[to] && !network.is_open(to);
+        (free || may_end(to) && !network.is_seam(h))
+            && (!at_root || inside(h) && network.dual.across(h).is_some_and(inside))
     }
 }

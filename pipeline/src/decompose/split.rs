@@ -4,6 +4,7 @@
 //! the region below some scale is a short way across it. Otherwise the chart is cut into two parts of about the same
 //! size. A chart is planar, so two connected parts of it are charts wherever neither touches itself.
 
+use super::complex::Complex;
 use super::dual::Dual;
 use super::features::mark_features;
 use super::merge::Limits;
@@ -44,7 +45,7 @@ pub fn split(
     let limits = Limits::new(settings);
     let by_scale = log_scale.and_then(|s| across_protrusion(&dual, s, &limits));
     let labels = by_scale.unwrap_or_else(|| halves(&dual, &limits));
-    let cells = cells(&dual, &limits);
+    let (cells, _) = cells(&dual, &limits);
     let size = (0..part.triangles().len()).map(|f| dual.area(f)).sum::<f64>() / cells.count as f64;
     let pieces = finish(&dual, labels, limits, settings, &cells, |_| size.sqrt())?;
     let on_surface = |piece: &Chart| Chart {
@@ -62,11 +63,12 @@ fn halves(dual: &Dual, limits: &Limits) -> Vec<u32> {
 }
 
 /// Per group of triangles, whether it may be a chart.
-fn legal(dual: &Dual, groups: &Cells, limits: &Limits) -> Vec<bool> {
-    let alone: Vec<u32> = (0..groups.of.len() as u32).collect();
-    let mut regions = Regions::new(dual, &alone, groups.of.clone(), groups.count);
+pub(super) fn legal(dual: &Dual, groups: &Cells, limits: &Limits) -> Vec<bool> {
+    let complex = Complex::new(dual, groups);
+    let mut regions = Regions::new(&complex, (0..groups.count as u32).collect(), groups.count);
     let outlines: Vec<_> = (0..groups.count as u32).map(|r| regions.outline_of(r)).collect();
-    regions.all.iter().zip(&outlines).map(|(region, outline)| limits.allow(dual, region, outline)).collect()
+    let shapes = regions.all.iter().zip(&outlines).map(|(region, outline)| regions.shape(region, outline));
+    shapes.map(|shape| limits.allow(&shape)).collect()
 }
 
 /// The best legal cut along a level of the area scale.

@@ -7,7 +7,7 @@
 
 use super::dual::Dual;
 use super::network::{Network, Path};
-use super::shortest::{Bounds, Tree, length, reversed, weight};
+use super::shortest::{Bounds, Goal, Tree, length, reversed, weight};
 use super::voronoi::At;
 use crate::id::HalfEdgeId;
 use std::collections::BinaryHeap;
@@ -38,7 +38,7 @@ struct Straightening<'n, 'a> {
 /// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges.
 pub(super) fn straighten(network: &mut Network, breadth: impl Fn(HalfEdgeId) -> f64) {
     let dual = network.dual;
-    let tree = || Tree::new(dual.mesh.points().len());
+    let tree = || Tree::new(dual);
     let area: f64 = (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum();
     let reach = REACH * (area / network.charts().max(1) as f64).sqrt();
     let band = band(network, breadth);
@@ -75,7 +75,7 @@ impl Straightening<'_, '_> {
             for half in 0..2 * pieces - 1 {
                 let n = path.len();
                 let range = half * n / (2 * pieces)..(half + 2) * n / (2 * pieces);
-                match self.shorten(&path[range.clone()].to_vec()) {
+                match self.shorten(&path[range.clone()]) {
                     Ok(piece) => drop(path.splice(range, piece)),
                     Err(straight) => done &= straight,
                 }
@@ -96,13 +96,8 @@ impl Straightening<'_, '_> {
         let labels = [left, right];
         let before = length(self.dual, path);
         self.network.lift(path);
-        let bounds = Bounds {
-            labels: &labels,
-            length: (1.0 - GAIN) * before,
-            target: Some(to),
-            to_open: false,
-            band: &self.band,
-        };
+        let bounds =
+            Bounds { goal: Goal::Vertex(to), labels: &labels, length: (1.0 - GAIN) * before, band: &self.band };
         self.trees[0].grow(self.network, from, &bounds);
         let found = self.trees[0].distance(to).map(|_| self.trees[0].path(self.dual, to));
         let Some(half_edges) = found else {
@@ -120,7 +115,7 @@ impl Straightening<'_, '_> {
             if third < 2 {
                 return;
             }
-            if let Ok(piece) = self.shorten(&path[..third].to_vec()) {
+            if let Ok(piece) = self.shorten(&path[..third]) {
                 path.splice(..third, piece);
             }
             let step = if turn % 3 == 2 { third / 2 } else { third };
@@ -166,12 +161,13 @@ impl Straightening<'_, '_> {
 
     /// The ways from the vertex where the sum of the distances to three `ends` is least, if it is less than `before`.
     fn meeting(&mut self, ends: &[usize], labels: &[u32], before: f64) -> Option<Vec<Vec<HalfEdgeId>>> {
-        let bounds = Bounds { labels, length: (1.0 - GAIN) * before, target: None, to_open: false, band: &self.band };
-        for (tree, end) in self.trees.iter_mut().zip(ends) {
-            tree.grow(self.network, *end, &bounds);
+        let length = (1.0 - GAIN) * before;
+        for (i, tree) in self.trees.iter_mut().enumerate() {
+            let goal = Goal::Meeting([ends[(i + 1) % 3], ends[(i + 2) % 3]]);
+            tree.grow(self.network, ends[i], &Bounds { goal, labels, length, band: &self.band });
         }
         let sum = |v: usize| Some(self.trees[0].distance(v)? + self.trees[1].distance(v)? + self.trees[2].distance(v)?);
-        let known = self.trees[0].reached.iter().filter(|v| !ends.contains(v)).filter_map(|v| Some((sum(*v)?, *v)));
+        let known = self.trees[0].settled.iter().filter(|v| !ends.contains(v)).filter_map(|v| Some((sum(*v)?, *v)));
         let (least, vertex) = known.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
         let ways: Vec<_> = self.trees.iter().map(|t| reversed(self.dual, &t.path(self.dual, vertex))).collect();
         let mut on_way: Vec<usize> = ways.iter().flatten().map(|h| self.dual.to(*h)).collect();
@@ -191,10 +187,10 @@ impl Straightening<'_, '_> {
         let before = length(self.dual, &arm);
         self.network.lift(&arm);
         let bounds =
-            Bounds { labels: &labels, length: (1.0 - GAIN) * before, target: None, to_open: true, band: &self.band };
+            Bounds { goal: Goal::OpenLoop(end), labels: &labels, length: (1.0 - GAIN) * before, band: &self.band };
         let tree = &mut self.trees[0];
         tree.grow(self.network, root, &bounds);
-        let open = tree.reached.iter().copied().find(|v| *v != root && self.network.on_one_loop(*v, end));
+        let open = tree.settled.last().copied().filter(|v| *v != root && self.network.on_one_loop(*v, end));
         let Some(vertex) = open else {
             self.network.put_back(&arm);
             return None;

@@ -143,9 +143,9 @@ fn prediction_agrees_with_the_map_within_a_decade() {
         let mesh = surface(&shapes::finger(16, length));
         let dual = Dual::new(&mesh);
         let limits = Limits::new(&smooth());
-        let cells = cells(&dual, &limits);
-        let mut network = network::Network::new(&dual, vec![0; mesh.triangles().len()], limits);
-        let predicted = judge::judge(&mut network, &cells)[0].expect("a chart").ratio;
+        let (cells, _) = cells(&dual, &limits);
+        let network = network::Network::new(&dual, vec![0; mesh.triangles().len()], limits);
+        let predicted = judge::judge(&network, &cells)[0].expect("a chart").ratio;
         let chart = assemble(&mesh, &network.labels).expect("a disk").into_charts().remove(0);
         let done = finish_chart(crate::map_chart(&chart, Order::Linear).expect("maps"));
         let measured = crate::distortion::area_ratio(&chart, &done.certified);

@@ -1,0 +1,217 @@
+//! The complex of cells: what the search needs of a partition of the triangles, at the size of the cells.
+//!
+//! The boundary of a cell is cut at corners into arcs. An arc is known by its two sides, half-arcs, each with the cell
+//! on its left, as an edge is by its half-edges. Corners are the vertices where other than two boundary edges of cells
+//! meet, where such edges reach the end of the surface, and one vertex of every boundary loop that has no other. So a
+//! boundary can visit a vertex twice only at a corner, and all that decides whether a union of cells is a chart is
+//! found without looking at a triangle: its loops by walking along half-arcs, and its Euler number as
+//! the sum over the cells, minus the arcs, plus the corners that come to lie inside.
+
+use super::dual::Dual;
+use super::voronoi::Cells;
+use crate::id::HalfEdgeId;
+use crate::space::Vec3;
+
+/// No arc, no cell, no corner.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// One side of an arc, with its cell on the left.
+#[derive(Clone, Debug)]
+pub(super) struct HalfArc {
+    pub cell: u32,
+    /// The corner at which it begins.
+    pub from: u32,
+    /// The half-arc after it around its cell.
+    pub next: u32,
+    /// The other side, or [`NONE`] where the surface ends.
+    pub twin: u32,
+    /// The cell on the other side of an edge where orientations disagree, else [`NONE`].
+    pub foe: u32,
+    pub length: f64,
+    /// The length that is a feature.
+    pub feature: f64,
+    /// A point about half way.
+    pub middle: Vec3,
+    pub first: HalfEdgeId,
+    last: HalfEdgeId,
+}
+
+/// What is known of a cell.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Cell {
+    pub faces: usize,
+    /// The Euler number of the cell, opened where it only touches itself.
+    pub euler: i64,
+    pub area: f64,
+    /// The sum of the area vectors.
+    pub normal: Vec3,
+    pub centroid: Vec3,
+}
+
+/// Cells and the arcs between them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Complex {
+    pub cells: Vec<Cell>,
+    /// In the order of their cells, then of their first half-edges.
+    pub arcs: Vec<HalfArc>,
+    pub corners: usize,
+}
+
+impl Complex {
+    pub(super) fn new(dual: &Dual, cells: &Cells) -> Self {
+        let tracer = Tracer::new(dual, cells);
+        let arcs = tracer.arcs();
+        let mut made = Self { cells: vec![Cell::default(); cells.count], arcs, corners: 0 };
+        made.measure(dual, cells, &tracer);
+        made.number_corners(dual);
+        made
+    }
+
+    /// Sums up triangles. With I inner vertices, B boundary half-edges and F triangles the Euler number of an opened
+    /// cell is I + (B - F)/2.
+    fn measure(&mut self, dual: &Dual, cells: &Cells, tracer: &Tracer) {
+        let mut doubled = vec![0_i64; cells.count];
+        let mut counted = vec![false; dual.mesh.points().len()];
+        tracer.boundary.iter().for_each(|h| counted[dual.from(*h)] = true);
+        tracer.boundary.iter().for_each(|h| doubled[tracer.cell(*h) as usize] += 1);
+        for (f, t) in dual.mesh.triangles().iter().enumerate() {
+            let (area, normal, centroid) = (dual.area(f), dual.area_vector(f), dual.centroid(f));
+            let fresh = t.iter().filter(|v| !std::mem::replace(&mut counted[v.index()], true)).count();
+            doubled[cells.of[f] as usize] += 2 * fresh as i64 - 1;
+            let cell = &mut self.cells[cells.of[f] as usize];
+            cell.faces += 1;
+            cell.area += area;
+            (0..3).for_each(|k| cell.normal[k] += normal[k]);
+            (0..3).for_each(|k| cell.centroid[k] += area * centroid[k]);
+        }
+        for (cell, doubled) in self.cells.iter_mut().zip(doubled) {
+            cell.euler = doubled / 2;
+            cell.centroid = cell.centroid.map(|x| x / cell.area);
+        }
+    }
+
+    /// Replaces vertices by numbers of corners.
+    fn number_corners(&mut self, dual: &Dual) {
+        let mut number = vec![NONE; dual.mesh.points().len()];
+        for arc in &mut self.arcs {
+            let corner = &mut number[arc.from as usize];
+            if *corner == NONE {
+                *corner = self.corners as u32;
+                self.corners += 1;
+            }
+            arc.from = *corner;
+        }
+    }
+}
+
+/// Finds the arcs.
+struct Tracer<'a> {
+    dual: &'a Dual<'a>,
+    of: &'a [u32],
+    /// The half-edges around cells, ascending.
+    boundary: Vec<HalfEdgeId>,
+    /// Per vertex, whether it is a corner.
+    corner: Vec<bool>,
+}
+
+impl<'a> Tracer<'a> {
+    fn new(dual: &'a Dual<'a>, cells: &'a Cells) -> Self {
+        let cell = |h: HalfEdgeId| cells.of[h.face().index()];
+        let is_boundary = |h: &HalfEdgeId| dual.across(*h).is_none_or(|t| cell(t) != cell(*h));
+        let boundary = dual.half_edges().filter(is_boundary).collect();
+        let mut made = Self { dual, of: &cells.of, boundary, corner: vec![false; dual.mesh.points().len()] };
+        made.mark_corners();
+        made
+    }
+
+    fn cell(&self, h: HalfEdgeId) -> u32 {
+        self.of[h.face().index()]
+    }
+
+    /// The cell on the other side of an edge where orientations disagree.
+    fn foe(&self, h: HalfEdgeId) -> u32 {
+        let twin = self.dual.mesh.edges().twin(h).filter(|_| self.dual.across(h).is_none());
+        twin.map_or(NONE, |t| self.cell(t))
+    }
+
+    /// The boundary half-edge after `h` around its cell: turns around the end of `h` until the cell ends, at the
+    /// latest at `h` itself.
+    fn next(&self, h: HalfEdgeId) -> HalfEdgeId {
+        let mut e = h.next();
+        while let Some(t) = self.dual.across(e).filter(|t| self.cell(*t) == self.cell(h)) {
+            e = t.next();
+        }
+        e
+    }
+
+    fn mark_corners(&mut self) {
+        let vertices = self.corner.len();
+        let (mut out, mut open) = (vec![0_u32; vertices], vec![false; vertices]);
+        for h in &self.boundary {
+            out[self.dual.from(*h)] += 1;
+            if self.dual.across(*h).is_none() {
+                (open[self.dual.from(*h)], open[self.dual.to(*h)]) = (true, true);
+            }
+        }
+        for v in (0..vertices).filter(|v| out[*v] > 0) {
+            self.corner[v] = out[v] != if open[v] { 1 } else { 2 };
+        }
+        for h in self.boundary.iter().filter(|h| self.dual.across(**h).is_none()) {
+            let next = self.next(*h);
+            self.corner[self.dual.from(next)] |= self.foe(*h) != self.foe(next);
+        }
+        self.mark_loops();
+    }
+
+    /// Makes a corner on every loop that has none. Every half-edge is walked over once.
+    fn mark_loops(&mut self) {
+        let mut seen = vec![false; self.of.len() * 3];
+        for start in 0..self.boundary.len() {
+            let mut h = self.boundary[start];
+            let mut found = seen[h.index()];
+            while !std::mem::replace(&mut seen[h.index()], true) {
+                found |= self.corner[self.dual.from(h)];
+                h = self.next(h);
+            }
+            self.corner[self.dual.from(h)] |= !found;
+        }
+    }
+
+    /// All half-arcs, their corners given as vertices.
+    fn arcs(&self) -> Vec<HalfArc> {
+        let mut starts: Vec<(u32, HalfEdgeId)> =
+            self.boundary.iter().filter(|h| self.corner[self.dual.from(**h)]).map(|h| (self.cell(*h), *h)).collect();
+        starts.sort_unstable();
+        let mut number = vec![NONE; self.of.len() * 3];
+        starts.iter().zip(0..).for_each(|((_, h), i)| number[h.index()] = i);
+        let mut arcs: Vec<HalfArc> = starts.iter().map(|(_, h)| self.arc(*h)).collect();
+        for arc in &mut arcs {
+            arc.next = number[self.next(arc.last).index()];
+            arc.twin = self.dual.across(arc.last).map_or(NONE, |t| number[t.index()]);
+        }
+        arcs
+    }
+
+    /// The half-arc that begins with `first`: up to the next corner. Every loop has one, so it ends.
+    fn arc(&self, first: HalfEdgeId) -> HalfArc {
+        let mut run = vec![first];
+        let mut last = first;
+        while !self.corner[self.dual.to(last)] {
+            last = self.next(last);
+            run.push(last);
+        }
+        let features = run.iter().filter(|h| self.dual.is_feature(**h));
+        HalfArc {
+            cell: self.cell(first),
+            from: self.dual.from(first) as u32,
+            next: NONE,
+            twin: NONE,
+            foe: self.foe(first),
+            length: run.iter().map(|h| self.dual.length(*h)).sum(),
+            feature: features.map(|h| self.dual.length(*h)).sum(),
+            middle: self.dual.middle(run[run.len() / 2]),
+            first,
+            last,
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! Small symmetric positive definite systems whose unknowns come in a good order already.
+//!
+//! Row by row, each along its paths in the elimination tree (Davis 2005, doi 10.1145/1114268.1114277). The systems of
+//! the search have a few hundred unknowns, come by the hundred, and are parts of one graph, so that one order serves
+//! them all: ordering and analysing each anew would cost several times its factorisation.
+
+const NONE: u32 = u32::MAX;
+
+/// A system that is put together from springs between unknowns, or between an unknown and a fixed place.
+pub(super) struct Springs {
+    diagonal: Vec<f64>,
+    joints: Vec<(u32, u32, f64)>,
+    pull: Vec<[f64; 2]>,
+}
+
+impl Springs {
+    pub(super) fn new(unknowns: usize) -> Self {
+        Self { diagonal: vec![0.0; unknowns], joints: Vec::new(), pull: vec![[0.0; 2]; unknowns] }
+    }
+
+    /// Joins two different unknowns.
+    pub(super) fn join(&mut self, [i, j]: [u32; 2], stiffness: f64) {
+        self.diagonal[i as usize] += stiffness;
+        self.diagonal[j as usize] += stiffness;
+        self.joints.push((i.max(j), i.min(j), -stiffness));
+    }
+
+    /// Joins an unknown to a place.
+    pub(super) fn hold(&mut self, i: u32, stiffness: f64, place: [f64; 2]) {
+        self.diagonal[i as usize] += stiffness;
+        (0..2).for_each(|k| self.pull[i as usize][k] += stiffness * place[k]);
+    }
+
+    /// Where the unknowns come to rest; none where the matrix is not positive definite in doubles.
+    pub(super) fn rest(self) -> Option<Vec<[f64; 2]>> {
+        let rows = Rows::new(self.diagonal.len(), &self.joints);
+        let mut factor = Factor::shaped(&rows);
+        factor.fill(&rows, &self.diagonal)?;
+        Some(factor.solve(self.pull))
+    }
+}
+
+/// The strict lower triangle by rows; equal places add up.
+struct Rows {
+    starts: Vec<u32>,
+    entries: Vec<(u32, f64)>,
+}
+
+impl Rows {
+    fn new(n: usize, joints: &[(u32, u32, f64)]) -> Self {
+        let mut starts = vec![0_u32; n + 1];
+        joints.iter().for_each(|e| starts[e.0 as usize + 1] += 1);
+        (0..n).for_each(|i| starts[i + 1] += starts[i]);
+        let mut next = starts.clone();
+        let mut entries = vec![(0, 0.0); joints.len()];
+        for (i, j, value) in joints {
+            entries[next[*i as usize] as usize] = (*j, *value);
+            next[*i as usize] += 1;
+        }
+        Self { starts, entries }
+    }
+
+    fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    fn row(&self, i: usize) -> &[(u32, f64)] {
+        &self.entries[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
+}
+
+/// The factor L of a matrix L D L^T, by columns, and the diagonal D.
+struct Factor {
+    /// The elimination tree.
+    parents: Vec<u32>,
+    starts: Vec<u32>,
+    /// Row and value of each entry; the columns are filled row by row.
+    entries: Vec<(u32, f64)>,
+    diagonal: Vec<f64>,
+}
+
+impl Factor {
+    /// The tree, and room for every column.
+    fn shaped(rows: &Rows) -> Self {
+        let n = rows.len();
+        let (mut parents, mut flags, mut starts) = (vec![NONE; n], vec![NONE; n], vec![0_u32; n + 1]);
+        for k in 0..n {
+            flags[k] = k as u32;
+            for (i, _) in rows.row(k) {
+                let mut i = *i as usize;
+                // Parents come after their children, and k is flagged: the climb ends there at the latest.
+                while flags[i] != k as u32 {
+                    flags[i] = k as u32;
+                    starts[i + 1] += 1;
+                    if parents[i] == NONE {
+                        parents[i] = k as u32;
+                    }
+                    i = parents[i] as usize;
+                }
+            }
+        }
+        (0..n).for_each(|i| starts[i + 1] += starts[i]);
+        let entries = vec![(0, 0.0); starts[n] as usize];
+        Self { parents, starts, entries, diagonal: Vec::with_capacity(n) }
+    }
+
+    /// The unknowns before `k` on which row `k` of the factor depends, each after those that it depends on itself.
+    fn reach(&self, rows: &Rows, k: usize, flags: &mut [u32], reach: &mut Vec<u32>) {
+        reach.clear();
+        flags[k] = k as u32;
+        for (i, _) in rows.row(k).iter().rev() {
+            let from = reach.len();
+            let mut i = *i;
+            while flags[i as usize] != k as u32 {
+                flags[i as usize] = k as u32;
+                reach.push(i);
+                i = self.parents[i as usize];
+            }
+            reach[from..].reverse();
+        }
+        reach.reverse();
+    }
+
+    /// Computes all rows; none where a pivot is not positive.
+    fn fill(&mut self, rows: &Rows, diagonal: &[f64]) -> Option<()> {
+        let n = rows.len();
+        let (mut flags, mut reach) = (vec![NONE; n], Vec::new());
+        let mut ends = self.starts[..n].to_vec();
+        let mut work = vec![0.0; n];
+        for k in 0..n {
+            self.reach(rows, k, &mut flags, &mut reach);
+            rows.row(k).iter().for_each(|(i, value)| work[*i as usize] += value);
+            let mut pivot = diagonal[k];
+            for i in reach.iter().map(|i| *i as usize) {
+                let y = std::mem::take(&mut work[i]);
+                let (start, end) = (self.starts[i] as usize, ends[i] as usize);
+                self.entries[start..end].iter().for_each(|(j, l)| work[*j as usize] -= l * y);
+                let l = y / self.diagonal[i];
+                pivot -= l * y;
+                self.entries[end] = (k as u32, l);
+                ends[i] += 1;
+            }
+            if pivot.is_nan() || pivot <= 0.0 {
+                return None;
+            }
+            self.diagonal.push(pivot);
+        }
+        Some(())
+    }
+
+    fn solve(&self, mut x: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+        let column = |i: usize| &self.entries[self.starts[i] as usize..self.starts[i + 1] as usize];
+        for i in 0..x.len() {
+            let y = x[i];
+            column(i).iter().for_each(|(j, l)| (0..2).for_each(|k| x[*j as usize][k] -= l * y[k]));
+        }
+        for i in (0..x.len()).rev() {
+            let mut y = x[i].map(|y| y / self.diagonal[i]);
+            column(i).iter().for_each(|(j, l)| (0..2).for_each(|k| y[k] -= l * x[*j as usize][k]));
+            x[i] = y;
+        }
+        x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chain_of_springs_stretches_linearly() {
+        let mut chain = Springs::new(50);
+        chain.hold(0, 1.0, [0.0, 7.0]);
+        chain.hold(49, 1.0, [51.0, 7.0]);
+        // A star order fills in: every second unknown first.
+        let place = |i: u32| if i.is_multiple_of(2) { i / 2 } else { 25 + i / 2 };
+        let mut shuffled = Springs::new(50);
+        shuffled.hold(place(0), 1.0, [0.0, 7.0]);
+        shuffled.hold(place(49), 1.0, [51.0, 7.0]);
+        for i in 0..49 {
+            chain.join([i, i + 1], 1.0);
+            shuffled.join([place(i + 1), place(i)], 0.5);
+            shuffled.join([place(i), place(i + 1)], 0.5);
+        }
+        let (rest, again) = (chain.rest().expect("held"), shuffled.rest().expect("held"));
+        for i in 0..50 {
+            let wanted = [f64::from(i + 1), 7.0];
+            for found in [rest[i as usize], again[place(i) as usize]] {
+                assert!((0..2).all(|k| (found[k] - wanted[k]).abs() < 1e-11), "{i}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_nothing_holds_does_not_come_to_rest() {
+        let mut loose = Springs::new(2);
+        loose.join([0, 1], 1.0);
+        assert!(loose.rest().is_none());
+    }
+}
