@@ -105,16 +105,20 @@ pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summ
 fn star_scales(chart: &Chart, plane: &[f64]) -> Vec<(f64, f64)> {
     let stars = Stars::new(chart.triangles(), chart.vertices().len());
     let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
-    let two_rings = |v: usize| {
+    let mut seen = vec![u32::MAX; space.len()];
+    let mut two_rings = |v: usize| {
+        let (mut in_plane, mut in_space) = (0.0, 0.0);
         let ring = stars.around(v).iter().flat_map(|f| chart.triangles()[*f as usize]);
-        let mut faces: Vec<u32> = ring.flat_map(|u| stars.around(u.index()).iter().copied()).collect();
-        faces.sort_unstable();
-        faces.dedup();
-        let sum = |area: &[f64]| faces.iter().map(|f| area[*f as usize]).sum::<f64>();
+        for f in ring.flat_map(|u| stars.around(u.index())).map(|f| *f as usize) {
+            if std::mem::replace(&mut seen[f], v as u32) != v as u32 {
+                in_plane += plane[f];
+                in_space += space[f];
+            }
+        }
         let weight = stars.around(v).iter().map(|f| space[*f as usize]).sum::<f64>();
-        (sum(plane) / sum(&space), weight)
+        (in_plane / in_space, weight)
     };
-    (0..chart.vertices().len()).map(two_rings).collect()
+    (0..chart.vertices().len()).map(&mut two_rings).collect()
 }
 
 /// Per triangle, the logarithm of the area scale around it: the mean over its corners, each with its two rings.
