@@ -162,12 +162,13 @@ impl Straightening<'_, '_> {
     /// The ways from the vertex where the sum of the distances to three `ends` is least, if it is less than `before`.
     fn meeting(&mut self, ends: &[usize], labels: &[u32], before: f64) -> Option<Vec<Vec<HalfEdgeId>>> {
         let length = (1.0 - GAIN) * before;
-        for (i, tree) in self.trees.iter_mut().enumerate() {
-            let goal = Goal::Meeting([ends[(i + 1) % 3], ends[(i + 2) % 3]]);
-            tree.grow(self.network, ends[i], &Bounds { goal, labels, length, band: &self.band });
-        }
+        let [first, second, third] = &mut self.trees;
+        let meeting = |a, b| Bounds { goal: Goal::Meeting([a, b]), labels, length, band: &self.band };
+        first.grow(self.network, ends[0], &meeting((ends[1], None), (ends[2], None)));
+        second.grow(self.network, ends[1], &meeting((ends[0], Some(first)), (ends[2], None)));
+        third.grow(self.network, ends[2], &meeting((ends[0], Some(first)), (ends[1], Some(second))));
         let sum = |v: usize| Some(self.trees[0].distance(v)? + self.trees[1].distance(v)? + self.trees[2].distance(v)?);
-        let known = self.trees[0].settled.iter().filter(|v| !ends.contains(v)).filter_map(|v| Some((sum(*v)?, *v)));
+        let known = self.trees[2].settled.iter().filter(|v| !ends.contains(v)).filter_map(|v| Some((sum(*v)?, *v)));
         let (least, vertex) = known.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
         let ways: Vec<_> = self.trees.iter().map(|t| reversed(self.dual, &t.path(self.dual, vertex))).collect();
         let mut on_way: Vec<usize> = ways.iter().flatten().map(|h| self.dual.to(*h)).collect();
