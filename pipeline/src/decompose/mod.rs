@@ -14,6 +14,7 @@ mod ldl;
 mod legality;
 mod merge;
 mod network;
+mod patches;
 mod predict;
 mod regions;
 mod search;
@@ -30,11 +31,12 @@ use judge::{Verdict, choose_outer, judge};
 pub use legality::Illegal;
 use merge::Limits;
 use network::Network;
+use patches::compact_cells;
 use predict::CellGraph;
 use regions::Regions;
 use search::Search;
 use straighten::straighten;
-use voronoi::{Cells, bisect_until, farthest_first};
+use voronoi::{Cells, bisect_until};
 
 /// Why a surface has no atlas.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -108,7 +110,7 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
 
 /// Legal cells of about the same size, and their complex.
 fn cells(dual: &Dual, limits: &Limits) -> (Cells, Complex) {
-    let cells = farthest_first(dual, |_, size| (size / 8).min(CELLS));
+    let cells = compact_cells(dual, |size| (size / 8).min(CELLS));
     let mut complex = Complex::default();
     let cells = bisect_until(dual, cells, |cells| {
         complex = Complex::new(dual, cells);
