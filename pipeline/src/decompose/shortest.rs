@@ -154,19 +154,33 @@ impl Tree {
         });
     }
 
-    /// What a path through `vertex` still needs at least: three points are not joined by less than half the
-    /// circumference of their triangle, measured along paths where these are known.
+    /// What a path through `vertex` still needs at least. Three points are not joined by less than straight lines from
+    /// their Fermat point, nor by less than half the circumference of their triangle, along paths that are known.
     fn left(&self, dual: &Dual, bounds: &Bounds, vertex: usize) -> f64 {
         let straight = |a: usize, b: usize| self.floor * distance(dual.point(a), dual.point(b));
-        let way = |(end, tree): (usize, Option<&Tree>)| {
-            tree.and_then(|t| t.distance(vertex)).unwrap_or_else(|| straight(vertex, end))
-        };
         match bounds.goal {
             Goal::Vertex(v) => straight(vertex, v),
             Goal::OpenLoop(_) => 0.0,
-            Goal::Meeting([a, b]) => 0.5 * (way(a) + way(b) + straight(a.0, b.0)),
+            Goal::Meeting([(a, to_a), (b, to_b)]) => {
+                let [va, vb, ab] = [straight(vertex, a), straight(vertex, b), straight(a, b)];
+                let known = |tree: Option<&Tree>, way: f64| tree.and_then(|t| t.distance(vertex)).unwrap_or(way);
+                joined([va, vb, ab]).max(0.5 * (known(to_a, va) + known(to_b, vb) + ab))
+            }
         }
     }
+}
+
+/// The length of the shortest lines that join the corners of a triangle with these sides: from its Fermat point, or
+/// the two shorter sides where the angle between them is 120 degrees or more.
+fn joined(mut sides: [f64; 3]) -> f64 {
+    sides.sort_unstable_by(f64::total_cmp);
+    let [a, b, c] = sides;
+    let [aa, bb, cc] = [a * a, b * b, c * c];
+    if cc >= aa + bb + a * b {
+        return a + b;
+    }
+    let doubled_area = 0.5 * (4.0 * aa * bb - (aa + bb - cc).powi(2)).max(0.0).sqrt();
+    (0.5 * (aa + bb + cc) + 3.0_f64.sqrt() * doubled_area).sqrt()
 }
 
 impl Goal<'_> {
