@@ -93,7 +93,8 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
     let mut network = Network::new(&dual, labels, limits);
     let mut verdicts = judge(&network, &cells);
-    for band in BANDS {
+    let bands = if network.has_seams() { &BANDS[..] } else { &[] };
+    for band in bands {
         let mut straight = Network::new(&dual, network.labels.clone(), limits);
         straighten(&mut straight, |h| band * graph.area(cells.of[h.face().index()]).sqrt());
         let found = judge(&straight, &cells);

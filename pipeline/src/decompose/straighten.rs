@@ -23,7 +23,7 @@ const FEW: usize = 4;
 const GAIN: f64 = 1e-6;
 
 /// How far from a corner its seams are laid anew, in parts of the size of a chart.
-const REACH: f64 = 0.35;
+const REACH: f64 = 0.25;
 
 /// Seams while they are straightened.
 struct Straightening<'n, 'a> {
