@@ -12,12 +12,46 @@ use crate::mesh::{EdgeTable, SurfaceMesh};
 /// [`Illegal`], for the first chart that is no disk with or without holes.
 pub fn assemble(mesh: &SurfaceMesh, labels: &[u32]) -> Result<Atlas, Illegal> {
     let sets = by_label(labels);
-    let charts = sets.into_iter().zip(0..).map(|(faces, id)| chart(mesh, ChartId(id), faces));
+    let mut places = Places::new(mesh, &sets);
+    let charts = sets.into_iter().zip(0..).map(|(faces, id)| chart(mesh, ChartId(id), faces, &mut places));
     Ok(Atlas { charts: charts.collect::<Result<_, _>>()?, feature_edges: 0 })
 }
 
+/// Where faces and vertices are in their charts.
+struct Places {
+    /// Per face its chart and its place there.
+    faces: Vec<(u32, u32)>,
+    /// Per vertex its place in the chart where it was met last, and that chart.
+    vertices: Vec<(u32, u32)>,
+}
+
+impl Places {
+    fn new(mesh: &SurfaceMesh, sets: &[Vec<FaceId>]) -> Self {
+        let mut faces = vec![(0, 0); mesh.triangles().len()];
+        for (set, chart) in sets.iter().zip(0..) {
+            set.iter().zip(0..).for_each(|(f, place)| faces[f.index()] = (chart, place));
+        }
+        Self { faces, vertices: vec![(u32::MAX, 0); mesh.points().len()] }
+    }
+
+    /// The vertices of a chart, ascending; from now on their places are those in it.
+    fn enter(&mut self, mesh: &SurfaceMesh, chart: ChartId, faces: &[FaceId]) -> Vec<VertexId> {
+        let mut vertices = Vec::new();
+        for v in faces.iter().flat_map(|f| mesh.triangles()[f.index()]) {
+            let place = &mut self.vertices[v.index()];
+            if place.0 != chart.0 {
+                place.0 = chart.0;
+                vertices.push(v);
+            }
+        }
+        vertices.sort_unstable();
+        vertices.iter().zip(0..).for_each(|(v, place)| self.vertices[v.index()].1 = place);
+        vertices
+    }
+}
+
 /// The faces of each label, ascending; labels in the order of their first faces.
-pub(super) fn by_label(labels: &[u32]) -> Vec<Vec<FaceId>> {
+fn by_label(labels: &[u32]) -> Vec<Vec<FaceId>> {
     let highest = labels.iter().max().map_or(0, |l| *l as usize + 1);
     let mut number = vec![u32::MAX; highest];
     let mut sets: Vec<Vec<FaceId>> = Vec::new();
@@ -36,13 +70,12 @@ pub(super) fn by_label(labels: &[u32]) -> Vec<Vec<FaceId>> {
 ///
 /// # Errors
 /// [`Illegal`] where they form none.
-pub(super) fn chart(mesh: &SurfaceMesh, id: ChartId, faces: Vec<FaceId>) -> Result<Chart, Illegal> {
-    let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| mesh.triangles()[f.index()]).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
-    let local = |v: VertexId| VertexId::at(vertices.partition_point(|u| *u < v));
+fn chart(mesh: &SurfaceMesh, id: ChartId, faces: Vec<FaceId>, places: &mut Places) -> Result<Chart, Illegal> {
+    let vertices = places.enter(mesh, id, &faces);
+    let local = |v: VertexId| VertexId(places.vertices[v.index()].1);
     let triangles: Vec<_> = faces.iter().map(|f| mesh.triangles()[f.index()].map(local)).collect();
-    let edges = EdgeTable::new(&triangles);
+    let inside = |f: FaceId| Some(places.faces[f.index()]).filter(|p| p.0 == id.0).map(|p| FaceId(p.1));
+    let edges = mesh.edges().part(&faces, inside);
     legality::verify(id, &triangles, &edges, vertices.len())?;
     let shapes = faces.iter().map(|f| mesh.metric().shapes[f.index()]).collect();
     let flagged = faces.iter().map(|f| mesh.metric().flagged[f.index()]).collect();

@@ -1,24 +1,32 @@
 //! The dual graph of a surface: triangles, joined where they share an edge along which both run consistently.
 
 use super::voronoi::Graph;
-use crate::id::{FaceId, HalfEdgeId};
+use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;
 use crate::space::{Vec3, cross, distance, midpoint, sub};
 
 const NONE: HalfEdgeId = HalfEdgeId(u32::MAX);
 
+/// A half-edge: what searches ask for, side by side.
+#[derive(Clone, Copy)]
+struct Side {
+    /// The half-edge on the other side, or [`NONE`].
+    across: HalfEdgeId,
+    from: VertexId,
+    /// The true length.
+    length: f64,
+}
+
 /// A surface as decomposition sees it. Lengths are in the unit of the metric.
 pub(super) struct Dual<'a> {
     pub mesh: &'a SurfaceMesh,
-    /// Per half-edge the one on the other side, or [`NONE`].
-    across: Vec<HalfEdgeId>,
+    sides: Vec<Side>,
     /// Per edge, whether it is a feature: no cell crosses it.
     pub feature: Vec<bool>,
     points: Vec<Vec3>,
     centroids: Vec<Vec3>,
     areas: Vec<f64>,
-    /// Per half-edge its true length, and the distance of the centroids at its sides by way of its middle.
-    lengths: Vec<f64>,
+    /// Per half-edge the distance of the centroids at its sides by way of its middle.
     steps: Vec<f64>,
 }
 
@@ -29,22 +37,21 @@ impl<'a> Dual<'a> {
         let triangles = mesh.triangles();
         let from = |h: HalfEdgeId| triangles[h.face().index()][h.side()];
         let across = |h: HalfEdgeId| mesh.edges().twin(h).filter(|t| from(*t) != from(h)).unwrap_or(NONE);
-        let centroid = |t: &[crate::id::VertexId; 3]| {
+        let length = |h: HalfEdgeId| distance(points[from(h).index()], points[from(h.next()).index()]);
+        let side = |h| Side { across: across(h), from: from(h), length: length(h) };
+        let centroid = |t: &[VertexId; 3]| {
             let [a, b, c] = t.map(|v| points[v.index()]);
             [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
         };
         let mut made = Self {
-            across: (0..3 * triangles.len()).map(|h| across(HalfEdgeId::at(h))).collect(),
+            sides: (0..3 * triangles.len()).map(|h| side(HalfEdgeId::at(h))).collect(),
             feature: vec![false; mesh.edges().len()],
             centroids: triangles.iter().map(centroid).collect(),
             areas: mesh.metric().shapes.iter().map(|s| s.area()).collect(),
-            lengths: Vec::new(),
             steps: Vec::new(),
             mesh,
             points,
         };
-        made.lengths =
-            made.half_edges().map(|h| distance(made.points[made.from(h)], made.points[made.to(h)])).collect();
         made.steps = made.half_edges().map(|h| made.step(h)).collect();
         made
     }
@@ -58,7 +65,7 @@ impl<'a> Dual<'a> {
     /// The half-edge on the other side, running the other way; none at the boundary, and where the triangles
     /// disagree about the orientation.
     pub(super) fn across(&self, h: HalfEdgeId) -> Option<HalfEdgeId> {
-        Some(self.across[h.index()]).filter(|t| *t != NONE)
+        Some(self.sides[h.index()].across).filter(|t| *t != NONE)
     }
 
     /// Whether the edge along `h` is a feature.
@@ -68,7 +75,7 @@ impl<'a> Dual<'a> {
 
     /// The vertex at which `h` begins.
     pub(super) fn from(&self, h: HalfEdgeId) -> usize {
-        self.mesh.triangles()[h.face().index()][h.side()].index()
+        self.sides[h.index()].from.index()
     }
 
     /// The vertex at which `h` ends.
@@ -97,7 +104,7 @@ impl<'a> Dual<'a> {
 
     /// The true length of the edge along `h`.
     pub(super) fn length(&self, h: HalfEdgeId) -> f64 {
-        self.lengths[h.index()]
+        self.sides[h.index()].length
     }
 
     /// The middle of the edge along `h`.
@@ -106,7 +113,7 @@ impl<'a> Dual<'a> {
     }
 
     pub(super) fn half_edges(&self) -> impl Iterator<Item = HalfEdgeId> + use<> {
-        (0..self.across.len() as u32).map(HalfEdgeId)
+        (0..self.sides.len() as u32).map(HalfEdgeId)
     }
 }
 

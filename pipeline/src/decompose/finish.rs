@@ -13,10 +13,10 @@ use crate::id::HalfEdgeId;
 
 /// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
 /// seams along a tube come together. So the area ratio is foretold again after every step, and the last good one kept.
-const BANDS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
+const BANDS: [f64; 3] = [0.5, 1.0, 2.0];
 
-/// How often a step is tried again with the seams held around the charts that it would distort too much.
-const TRIES: usize = 3;
+/// The parts of seams that are tried one after the other where not all can be straightened at once.
+const PARTS: usize = 8;
 
 /// Straightens the seams between labels and makes the charts. `size` tells that of a cell.
 pub(super) fn finish(
@@ -27,27 +27,71 @@ pub(super) fn finish(
     cells: &Cells,
     size: impl Fn(HalfEdgeId) -> f64,
 ) -> Result<Atlas, Error> {
-    let mut network = Network::new(dual, labels, limits);
-    let mut verdicts = judge(&network, cells);
-    for band in BANDS {
-        let mut held = vec![false; network.label_count()];
-        for _ in 0..TRIES {
-            let mut straight = Network::new(dual, network.labels.clone(), limits);
-            let holds = |h: HalfEdgeId| held[network.labels[h.face().index()] as usize];
-            let free = |h: HalfEdgeId| !holds(h) && !dual.across(h).is_some_and(holds);
-            straighten(&mut straight, |h| if free(h) { band * size(h) } else { 0.0 });
-            let found = judge(&straight, cells);
-            let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
-            let worse = |label: usize| ratio(&found[label]) > settings.max_area_ratio.max(ratio(&verdicts[label]));
-            let bad: Vec<usize> = (0..held.len()).filter(|l| worse(*l)).collect();
-            if bad.is_empty() && straight.is_sound() {
-                (network, verdicts) = (straight, found);
-                break;
-            }
-            bad.into_iter().for_each(|label| held[label] = true);
+    let mut best = Judged::new(Network::new(dual, labels, limits), cells);
+    let bands = if best.network.has_seams() { &BANDS[..] } else { &[] };
+    for band in bands {
+        let breadth = |h: HalfEdgeId| band * size(h);
+        let Err(bad) = best.step(cells, limits, settings.max_area_ratio, breadth) else { continue };
+        // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
+        for part in 0..PARTS {
+            let part_of = best.parts(&bad);
+            let breadth = |h: HalfEdgeId| if part_of(h).is_none_or(|p| p == part) { band * size(h) } else { 0.0 };
+            let _kept_or_left = best.step(cells, limits, settings.max_area_ratio, breadth);
         }
     }
+    let Judged { network, verdicts } = best;
     let mut atlas = assemble(dual.mesh, &network.labels)?;
     choose_outer(&mut atlas, &verdicts);
     Ok(atlas)
+}
+
+/// Seams with what is foretold of their charts.
+struct Judged<'a> {
+    network: Network<'a>,
+    verdicts: Vec<Option<Verdict>>,
+}
+
+impl<'a> Judged<'a> {
+    fn new(network: Network<'a>, cells: &Cells) -> Self {
+        let verdicts = judge(&network, cells);
+        Self { network, verdicts }
+    }
+
+    /// Straightens the seams as far as `breadth` allows, if no chart's ratio rises above `largest` by that; otherwise
+    /// all stays, and these charts are returned.
+    fn step(
+        &mut self,
+        cells: &Cells,
+        limits: Limits,
+        largest: f64,
+        breadth: impl Fn(HalfEdgeId) -> f64,
+    ) -> Result<(), Vec<u32>> {
+        let mut network = Network::new(self.network.dual, self.network.labels.clone(), limits);
+        straighten(&mut network, breadth);
+        let straight = Self::new(network, cells);
+        let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
+        let worse = |(new, old): (&Option<Verdict>, &Option<Verdict>)| ratio(new) > largest.max(ratio(old));
+        let pairs = straight.verdicts.iter().zip(&self.verdicts);
+        let bad: Vec<u32> = pairs.zip(0..).filter(|(pair, _)| worse(*pair)).map(|(_, label)| label).collect();
+        if bad.is_empty() && straight.network.is_sound() {
+            *self = straight;
+            return Ok(());
+        }
+        Err(bad)
+    }
+
+    /// Per half-edge on a seam of the charts `labels` its part, counted along the seam; none elsewhere.
+    fn parts(&self, labels: &[u32]) -> impl Fn(HalfEdgeId) -> Option<usize> + use<'a> {
+        let edges = self.network.dual.mesh.edges();
+        let mut part = vec![None; edges.len()];
+        for curve in self.network.curves() {
+            let length = curve.len();
+            for (i, h) in curve.into_iter().enumerate() {
+                let sides = [Some(h), self.network.dual.across(h)];
+                let concerned = sides.into_iter().flatten().any(|s| labels.contains(&self.network.label(s)));
+                part[edges.edge(h).index()] = concerned.then_some(i * PARTS / length);
+            }
+        }
+        move |h| part[edges.edge(h).index()]
+    }
 }

@@ -27,6 +27,7 @@ mod ldl;
 mod legality;
 mod merge;
 mod network;
+mod patches;
 mod predict;
 mod regions;
 mod search;
@@ -46,11 +47,12 @@ use features::mark_features;
 use finish::finish;
 pub use legality::Illegal;
 use merge::Limits;
+use patches::compact_cells;
 use predict::CellGraph;
 use search::Search;
 use split::legal;
 pub use split::split;
-use voronoi::{Cells, bisect_until, farthest_first};
+use voronoi::{Cells, bisect_until};
 
 /// Why a surface has no atlas: a fault of planish, as every surface has one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -110,9 +112,12 @@ impl Limits {
 
 /// Legal cells of about the same size, and their complex.
 fn cells(dual: &Dual, limits: &Limits) -> (Cells, Complex) {
-    let cells = farthest_first(dual, |_, size| (size / 8).min(CELLS));
-    let cells = bisect_until(dual, cells, |cells| legal(dual, cells, limits));
-    let complex = Complex::new(dual, &cells);
+    let cells = compact_cells(dual, |size| (size / 8).min(CELLS));
+    let mut complex = Complex::default();
+    let cells = bisect_until(dual, cells, |cells| {
+        complex = Complex::new(dual, cells);
+        legal(&complex, limits)
+    });
     (cells, complex)
 }
 

@@ -208,6 +208,11 @@ impl<'a> Network<'a> {
         }
     }
 
+    /// Whether there is a seam.
+    pub(super) fn has_seams(&self) -> bool {
+        self.seam.contains(&true)
+    }
+
     /// The number of charts.
     pub(super) fn charts(&self) -> usize {
         self.sizes.iter().filter(|s| **s > 0).count()

@@ -44,7 +44,7 @@ struct Score {
 impl Search<'_> {
     /// Per cell its chart.
     pub(super) fn run(&self) -> Cells {
-        let components = farthest_first(self.graph, |_, _| 1);
+        let components = farthest_first(self.graph, |_| 1);
         let whole = Regions::new(self.complex, components.of.clone(), components.count);
         let whole = self.fine(whole, WHOLE * self.bound);
         let mut best: Vec<(Score, usize)> = whole.iter().map(|w| (Score::of_whole(*w), 0)).collect();
@@ -78,7 +78,7 @@ impl Search<'_> {
     /// Grows charts one way: per cell its chart, and the score of every component.
     fn way(&self, count: usize, weights: Weights, components: &Cells, whole: &[bool]) -> (Vec<u32>, Vec<Score>) {
         let is_whole = |cell: usize| whole[components.of[cell] as usize];
-        let groups = farthest_first(self.graph, |cell, _| if is_whole(cell) { 1 } else { count });
+        let groups = farthest_first(self.graph, |part| if is_whole(part[0]) { 1 } else { count });
         let groups = bisect_until(self.graph, groups, |groups| {
             self.fine(Regions::new(self.complex, groups.of.clone(), groups.count), self.limits.area_ratio)
         });

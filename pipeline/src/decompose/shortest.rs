@@ -47,19 +47,19 @@ pub(super) struct Tree {
 
 /// What paths are sought for.
 #[derive(Clone, Copy)]
-pub(super) enum Goal {
+pub(super) enum Goal<'a> {
     /// This vertex.
     Vertex(usize),
     /// The nearest vertex of the open loop through this one.
     OpenLoop(usize),
-    /// The place where the paths from the root and from two more vertices meet; none is known before all are grown.
-    Meeting([usize; 2]),
+    /// The place where the paths from the root and from two more vertices meet, whose trees may have been grown already.
+    Meeting([(usize, Option<&'a Tree>); 2]),
 }
 
 /// Where paths may go.
 #[derive(Clone, Copy)]
 pub(super) struct Bounds<'a> {
-    pub goal: Goal,
+    pub goal: Goal<'a>,
     /// Through the inside of these charts, touching no seam.
     pub labels: &'a [u32],
     /// No further than this (where three paths meet: all of them together).
@@ -99,69 +99,104 @@ impl Tree {
         path
     }
 
-    /// Grows the tree from `from`: Dijkstra, ordered by the distance with a bound for what is left (A*: Hart, Nilsson
-    /// and Raphael 1968, doi 10.1109/TSSC.1968.300136). Ends because distances only fall.
+    /// Grows the tree from `from`: Dijkstra, and on the way to one vertex ordered by the distance with what is left at
+    /// least (A*: Hart, Nilsson and Raphael 1968, doi 10.1109/TSSC.1968.300136). Ends because distances only fall.
     pub(super) fn grow(&mut self, network: &Network, from: usize, bounds: &Bounds) {
-        let dual = network.dual;
-        let mut heap = std::mem::take(&mut self.heap);
-        let plain = self.floor == 1.0;
-        self.now += 1;
-        self.from = from;
-        self.settled.clear();
-        heap.clear();
-        heap.push(At { distance: self.left(dual, bounds, from), node: from as u32 });
-        self.known[from] = Reached { stamp: self.now, via: HalfEdgeId(0), distance: 0.0 };
-        while let Some(At { distance: sum, node }) = heap.pop() {
+        let ahead = |tree: &Self, v: usize| match bounds.goal {
+            Goal::Vertex(_) => tree.left(network.dual, bounds, v),
+            _ => 0.0,
+        };
+        self.start(from);
+        let mut limit = bounds.length;
+        while let Some(At { distance: sum, node }) = self.heap.pop() {
             let node = node as usize;
             let so_far = self.known[node].distance;
-            if sum > so_far + self.left(dual, bounds, node) {
+            if sum > so_far + ahead(self, node) && node != from {
                 continue;
             }
             self.settled.push(node);
-            if node != from && (bounds.goal.is_at(network, node) || network.is_open(node)) {
-                if bounds.goal.is_at(network, node) {
-                    break;
-                }
-                continue;
+            if node != from && bounds.goal.is_at(network, node) {
+                return;
             }
-            network.each_out(node, |h| {
-                let to = dual.to(h);
-                let distance = so_far + if plain { dual.length(h) } else { weight(dual, h) };
-                let known = &self.known[to];
-                if known.stamp == self.now && known.distance <= distance || !bounds.admit(network, h, to, node == from)
-                {
-                    return;
-                }
-                let sum = distance + self.left(dual, bounds, to);
-                if sum <= bounds.length {
-                    self.known[to] = Reached { stamp: self.now, via: h, distance };
-                    heap.push(At { distance: sum, node: to as u32 });
-                }
-            });
+            if node == from || !network.is_open(node) {
+                limit = limit.min(bounds.goal.total(node, so_far));
+                self.spread(network, node, &Bounds { length: limit, ..*bounds }, ahead);
+            }
         }
-        self.heap = heap;
     }
 
-    /// What a path through `vertex` still needs at least. It never falls by more than the length of an edge, so that
-    /// vertices are settled at their distances. Three points are not joined by less than half of their triangle.
-    fn left(&self, dual: &Dual, bounds: &Bounds, vertex: usize) -> f64 {
-        let apart = |a: usize, b: usize| distance(dual.point(a), dual.point(b));
-        self.floor
-            * match bounds.goal {
-                Goal::Vertex(v) => apart(vertex, v),
-                Goal::OpenLoop(_) => 0.0,
-                Goal::Meeting([a, b]) => 0.5 * (apart(vertex, a) + apart(vertex, b) + apart(a, b)),
+    fn start(&mut self, from: usize) {
+        self.now += 1;
+        self.from = from;
+        self.settled.clear();
+        self.heap.clear();
+        self.heap.push(At { distance: 0.0, node: from as u32 });
+        self.known[from] = Reached { stamp: self.now, via: HalfEdgeId(0), distance: 0.0 };
+    }
+
+    /// Reaches the neighbours of `node`.
+    fn spread(&mut self, network: &Network, node: usize, bounds: &Bounds, ahead: impl Fn(&Self, usize) -> f64) {
+        let dual = network.dual;
+        let plain = self.floor == 1.0;
+        let so_far = self.known[node].distance;
+        network.each_out(node, |h| {
+            let to = dual.to(h);
+            let distance = so_far + if plain { dual.length(h) } else { weight(dual, h) };
+            let known = &self.known[to];
+            let reached = known.stamp == self.now && known.distance <= distance;
+            if reached || !bounds.admit(network, h, to, node == self.from) {
+                return;
             }
+            if distance + self.left(dual, bounds, to) <= bounds.length {
+                self.known[to] = Reached { stamp: self.now, via: h, distance };
+                self.heap.push(At { distance: distance + ahead(self, to), node: to as u32 });
+            }
+        });
+    }
+
+    /// What a path through `vertex` still needs at least. Three points are not joined by less than straight lines from
+    /// their Fermat point, nor by less than half the circumference of their triangle, along paths that are known.
+    fn left(&self, dual: &Dual, bounds: &Bounds, vertex: usize) -> f64 {
+        let straight = |a: usize, b: usize| self.floor * distance(dual.point(a), dual.point(b));
+        match bounds.goal {
+            Goal::Vertex(v) => straight(vertex, v),
+            Goal::OpenLoop(_) => 0.0,
+            Goal::Meeting([(a, to_a), (b, to_b)]) => {
+                let [va, vb, ab] = [straight(vertex, a), straight(vertex, b), straight(a, b)];
+                let known = |tree: Option<&Tree>, way: f64| tree.and_then(|t| t.distance(vertex)).unwrap_or(way);
+                joined([va, vb, ab]).max(0.5 * (known(to_a, va) + known(to_b, vb) + ab))
+            }
+        }
     }
 }
 
-impl Goal {
+/// The length of the shortest lines that join the corners of a triangle with these sides: from its Fermat point, or
+/// the two shorter sides where the angle between them is 120 degrees or more.
+fn joined(mut sides: [f64; 3]) -> f64 {
+    sides.sort_unstable_by(f64::total_cmp);
+    let [a, b, c] = sides;
+    let [aa, bb, cc] = [a * a, b * b, c * c];
+    if cc >= aa + bb + a * b {
+        return a + b;
+    }
+    let doubled_area = 0.5 * (4.0 * aa * bb - (aa + bb - cc).powi(2)).max(0.0).sqrt();
+    (0.5 * (aa + bb + cc) + 3.0_f64.sqrt() * doubled_area).sqrt()
+}
+
+impl Goal<'_> {
     fn is_at(&self, network: &Network, vertex: usize) -> bool {
         match self {
             Goal::Vertex(v) => vertex == *v,
             Goal::OpenLoop(v) => network.on_one_loop(vertex, *v),
             Goal::Meeting(_) => false,
         }
+    }
+
+    /// The three ways to `vertex` together, where all are known; else infinite.
+    fn total(&self, vertex: usize, own: f64) -> f64 {
+        let Goal::Meeting([(a, Some(to_a)), (b, Some(to_b))]) = self else { return f64::INFINITY };
+        let ways = to_a.distance(vertex).zip(to_b.distance(vertex)).filter(|_| vertex != *a && vertex != *b);
+        ways.map_or(f64::INFINITY, |(a, b)| own + a + b)
     }
 }
 

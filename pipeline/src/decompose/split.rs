@@ -59,14 +59,14 @@ pub fn split(
 
 /// Two parts of about the same size; more where these are no charts.
 fn halves(dual: &Dual, limits: &Limits) -> Vec<u32> {
-    bisect_until(dual, farthest_first(dual, |_, _| 2), |groups| legal(dual, groups, limits)).of
+    bisect_until(dual, farthest_first(dual, |_| 2), |groups| legal(&Complex::new(dual, groups), limits)).of
 }
 
-/// Per group of triangles, whether it may be a chart.
-pub(super) fn legal(dual: &Dual, groups: &Cells, limits: &Limits) -> Vec<bool> {
-    let complex = Complex::new(dual, groups);
-    let mut regions = Regions::new(&complex, (0..groups.count as u32).collect(), groups.count);
-    let outlines: Vec<_> = (0..groups.count as u32).map(|r| regions.outline_of(r)).collect();
+/// Per cell, whether it may be a chart.
+pub(super) fn legal(complex: &Complex, limits: &Limits) -> Vec<bool> {
+    let count = complex.cells.len();
+    let mut regions = Regions::new(complex, (0..count as u32).collect(), count);
+    let outlines: Vec<_> = (0..count as u32).map(|r| regions.outline_of(r)).collect();
     let shapes = regions.all.iter().zip(&outlines).map(|(region, outline)| regions.shape(region, outline));
     shapes.map(|shape| limits.allow(&shape)).collect()
 }
@@ -80,7 +80,7 @@ fn across_protrusion(dual: &Dual, log_scale: &[f64], limits: &Limits) -> Option<
         let labels = below(dual, log_scale, low + level * (high - low))?;
         let groups = Cells { of: labels, count: 2 };
         let cost = cut_length(dual, &groups.of) * (1.0 + OFF_CENTRE * (level - 0.5).abs());
-        legal(dual, &groups, limits).iter().all(|l| *l).then_some((cost, groups.of))
+        legal(&Complex::new(dual, &groups), limits).iter().all(|l| *l).then_some((cost, groups.of))
     };
     let cuts = LEVELS.iter().filter_map(|level| cut(*level));
     cuts.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, labels)| labels)

@@ -10,7 +10,7 @@ use super::network::{Network, Path};
 use super::shortest::{Bounds, Goal, Tree, length, reversed, weight};
 use super::voronoi::At;
 use crate::id::HalfEdgeId;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeSet, BinaryHeap};
 
 /// Rounds over all seams and corners, and the share of the length that makes another one worth while.
 const ROUNDS: usize = 2;
@@ -23,7 +23,7 @@ const FEW: usize = 4;
 const GAIN: f64 = 1e-6;
 
 /// How far from a corner its seams are laid anew, in parts of the size of a chart.
-const REACH: f64 = 0.35;
+const REACH: f64 = 0.25;
 
 /// Seams while they are straightened.
 struct Straightening<'n, 'a> {
@@ -33,6 +33,9 @@ struct Straightening<'n, 'a> {
     reach: f64,
     /// Per vertex, whether it is near enough to the first seams.
     band: Vec<bool>,
+    /// The seams, and the corners with their seams, that were tried in vain: they are not tried again before they
+    /// have changed.
+    vain: BTreeSet<(Option<usize>, Vec<HalfEdgeId>)>,
 }
 
 /// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges.
@@ -42,7 +45,7 @@ pub(super) fn straighten(network: &mut Network, breadth: impl Fn(HalfEdgeId) -> 
     let area: f64 = (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum();
     let reach = REACH * (area / network.charts().max(1) as f64).sqrt();
     let band = band(network, breadth);
-    let mut work = Straightening { network, dual, trees: [tree(), tree(), tree()], reach, band };
+    let mut work = Straightening { network, dual, trees: [tree(), tree(), tree()], reach, band, vain: BTreeSet::new() };
     for _ in 0..ROUNDS {
         let before = work.total();
         work.seams();
@@ -63,28 +66,38 @@ impl Straightening<'_, '_> {
     fn seams(&mut self) {
         for path in self.network.curves() {
             let closed = self.dual.from(path[0]) == self.dual.to(path[path.len() - 1]);
-            if closed { self.shorten_loop(path) } else { self.shorten_all(path) }
+            let tried = (None, path);
+            if self.vain.contains(&tried) {
+                continue;
+            }
+            let path = tried.1.clone();
+            let shorter = if closed { self.shorten_loop(path) } else { self.shorten_all(path) };
+            if !shorter {
+                self.vain.insert(tried);
+            }
         }
     }
 
     /// A seam as a whole; where that fails, by overlapping pieces, then by pieces half as long, down to a few edges.
-    fn shorten_all(&mut self, mut path: Vec<HalfEdgeId>) {
-        let mut pieces = 1;
-        while path.len() / pieces >= FEW {
-            let mut done = true;
+    /// Whether it became shorter.
+    fn shorten_all(&mut self, mut path: Vec<HalfEdgeId>) -> bool {
+        let (mut pieces, mut shorter, mut done) = (1, false, false);
+        while !done && path.len() / pieces >= FEW {
+            done = true;
             for half in 0..2 * pieces - 1 {
                 let n = path.len();
                 let range = half * n / (2 * pieces)..(half + 2) * n / (2 * pieces);
                 match self.shorten(&path[range.clone()]) {
-                    Ok(piece) => drop(path.splice(range, piece)),
+                    Ok(piece) => {
+                        drop(path.splice(range, piece));
+                        shorter = true;
+                    }
                     Err(straight) => done &= straight,
                 }
             }
-            if done {
-                return;
-            }
             pieces *= 2;
         }
+        shorter
     }
 
     /// The shortest path in the place of a seam (or a part of one); else whether there was none that is shorter.
@@ -108,36 +121,50 @@ impl Straightening<'_, '_> {
         if laid { Ok(half_edges) } else { Err(false) }
     }
 
-    /// A closed seam: its thirds, then thirds that begin in the middle of these.
-    fn shorten_loop(&mut self, mut path: Vec<HalfEdgeId>) {
+    /// A closed seam: its thirds, then thirds that begin in the middle of these. Whether it became shorter.
+    fn shorten_loop(&mut self, mut path: Vec<HalfEdgeId>) -> bool {
+        let mut shorter = false;
         for turn in 0..12 {
             let third = path.len() / 3;
             if third < 2 {
-                return;
+                break;
             }
             if let Ok(piece) = self.shorten(&path[..third]) {
                 path.splice(..third, piece);
+                shorter = true;
             }
             let step = if turn % 3 == 2 { third / 2 } else { third };
             path.rotate_left(step);
         }
+        shorter
     }
 
     /// One pass over all corners.
     fn corners(&mut self) {
         for vertex in 0..self.dual.mesh.points().len() {
-            match (self.network.is_open(vertex), self.network.degree(vertex)) {
-                (false, 3) => self.move_corner(vertex),
-                (true, 1) => self.slide(vertex),
+            let seams = match (self.network.is_open(vertex), self.network.degree(vertex)) {
+                (false, 3) | (true, 1) => self.network.seams_at(vertex),
+                _ => continue,
+            };
+            let arms: Vec<_> = seams.iter().map(|h| self.network.follow(*h, self.reach)).collect();
+            let tried = (Some(vertex), arms.concat());
+            if self.vain.contains(&tried) {
+                continue;
+            }
+            let moved = match &arms[..] {
+                [arm] => self.slide(vertex, arm),
+                [_, _, _] => self.move_corner(vertex, &arms),
                 _ => None,
             };
+            if moved.is_none() {
+                self.vain.insert(tried);
+            }
         }
     }
 
     /// Moves a corner of three seams to where they are shortest.
-    fn move_corner(&mut self, corner: usize) -> Option<()> {
-        let starts = self.network.seams_at(corner);
-        let arms: Vec<_> = starts.iter().map(|h| self.network.follow(*h, self.reach)).collect();
+    fn move_corner(&mut self, corner: usize, arms: &[Vec<HalfEdgeId>]) -> Option<()> {
+        let starts: Vec<HalfEdgeId> = arms.iter().map(|a| a[0]).collect();
         let ends: Vec<usize> = arms.iter().map(|a| self.dual.to(a[a.len() - 1])).collect();
         let labels: Vec<u32> = starts.iter().map(|h| self.network.label(*h)).collect();
         let distinct = |v: &[u32]| v[0] != v[1] && v[1] != v[2] && v[2] != v[0];
@@ -162,12 +189,13 @@ impl Straightening<'_, '_> {
     /// The ways from the vertex where the sum of the distances to three `ends` is least, if it is less than `before`.
     fn meeting(&mut self, ends: &[usize], labels: &[u32], before: f64) -> Option<Vec<Vec<HalfEdgeId>>> {
         let length = (1.0 - GAIN) * before;
-        for (i, tree) in self.trees.iter_mut().enumerate() {
-            let goal = Goal::Meeting([ends[(i + 1) % 3], ends[(i + 2) % 3]]);
-            tree.grow(self.network, ends[i], &Bounds { goal, labels, length, band: &self.band });
-        }
+        let [first, second, third] = &mut self.trees;
+        let meeting = |a, b| Bounds { goal: Goal::Meeting([a, b]), labels, length, band: &self.band };
+        first.grow(self.network, ends[0], &meeting((ends[1], None), (ends[2], None)));
+        second.grow(self.network, ends[1], &meeting((ends[0], Some(first)), (ends[2], None)));
+        third.grow(self.network, ends[2], &meeting((ends[0], Some(first)), (ends[1], Some(second))));
         let sum = |v: usize| Some(self.trees[0].distance(v)? + self.trees[1].distance(v)? + self.trees[2].distance(v)?);
-        let known = self.trees[0].settled.iter().filter(|v| !ends.contains(v)).filter_map(|v| Some((sum(*v)?, *v)));
+        let known = self.trees[2].settled.iter().filter(|v| !ends.contains(v)).filter_map(|v| Some((sum(*v)?, *v)));
         let (least, vertex) = known.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
         let ways: Vec<_> = self.trees.iter().map(|t| reversed(self.dual, &t.path(self.dual, vertex))).collect();
         let mut on_way: Vec<usize> = ways.iter().flatten().map(|h| self.dual.to(*h)).collect();
@@ -178,25 +206,24 @@ impl Straightening<'_, '_> {
     }
 
     /// Moves the end of a seam along the open boundary to where the seam is shortest.
-    fn slide(&mut self, end: usize) -> Option<()> {
-        let start = *self.network.seams_at(end).first()?;
-        let arm = self.network.follow(start, self.reach);
+    fn slide(&mut self, end: usize, arm: &[HalfEdgeId]) -> Option<()> {
+        let start = arm[0];
         let root = self.dual.to(arm[arm.len() - 1]);
         let (left, right) = (self.network.label(start), self.network.label(self.dual.across(start)?));
         let labels = [left, right];
-        let before = length(self.dual, &arm);
-        self.network.lift(&arm);
+        let before = length(self.dual, arm);
+        self.network.lift(arm);
         let bounds =
             Bounds { goal: Goal::OpenLoop(end), labels: &labels, length: (1.0 - GAIN) * before, band: &self.band };
         let tree = &mut self.trees[0];
         tree.grow(self.network, root, &bounds);
         let open = tree.settled.last().copied().filter(|v| *v != root && self.network.on_one_loop(*v, end));
         let Some(vertex) = open else {
-            self.network.put_back(&arm);
+            self.network.put_back(arm);
             return None;
         };
         let half_edges = reversed(self.dual, &tree.path(self.dual, vertex));
-        self.network.lay(&arm, &[Path { half_edges, left, right }], &labels).then_some(())
+        self.network.lay(arm, &[Path { half_edges, left, right }], &labels).then_some(())
     }
 }
 

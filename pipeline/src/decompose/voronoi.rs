@@ -6,7 +6,8 @@
 //! on n evenly spread nodes about n log k visits.
 
 use std::cmp::Ordering;
-use std::collections::{BTreeSet, BinaryHeap};
+use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 
 const NO_CELL: u32 = u32::MAX;
 
@@ -54,13 +55,15 @@ struct Growth<'a, G> {
     heap: BinaryHeap<At>,
     /// Nodes in the order in which they were first reached.
     reached: Vec<usize>,
+    /// Seeds in the order of their cells.
+    seeds: Vec<usize>,
 }
 
 impl<'a, G: Graph> Growth<'a, G> {
     fn new(graph: &'a G) -> Self {
         let n = graph.len();
         let (distance, of) = (vec![f64::INFINITY; n], vec![NO_CELL; n]);
-        Self { graph, distance, of, heap: BinaryHeap::new(), reached: Vec::new() }
+        Self { graph, distance, of, heap: BinaryHeap::new(), reached: Vec::new(), seeds: Vec::new() }
     }
 
     /// Adds a seed; every node that comes closer changes to its cell. Ends because a node is visited only with a
@@ -99,8 +102,8 @@ impl<'a, G: Graph> Growth<'a, G> {
     }
 
     /// Cuts the connected component of `start`, which has no cells yet, into cells numbered from `first` on:
-    /// `wanted(start, size)` of them, at least one and at most `size`. Returns the next number.
-    fn component(&mut self, start: usize, first: u32, wanted: impl Fn(usize, usize) -> usize) -> u32 {
+    /// `wanted(nodes)` of them, at least one and at most as many as there are nodes. Returns the next number.
+    fn component(&mut self, start: usize, first: u32, wanted: impl Fn(&[usize]) -> usize) -> u32 {
         // A first sweep finds the component and its node farthest from where it was entered: a tip.
         self.seed(start, first);
         let mut nodes = std::mem::take(&mut self.reached);
@@ -110,36 +113,78 @@ impl<'a, G: Graph> Growth<'a, G> {
         let tip = farthest.unwrap_or(start);
         self.clear(&nodes);
         self.seed(tip, first);
+        self.seeds.push(tip);
         self.reached.clear();
-        let mut far: BinaryHeap<Far> = nodes.iter().map(|i| Far(self.distance[*i], *i as u32)).collect();
-        let mut seeds = BTreeSet::from([tip]);
-        let wanted = wanted(start, nodes.len()).clamp(1, nodes.len());
-        while seeds.len() < wanted
-            && let Some(Far(distance, node)) = far.pop()
+        let others = nodes.iter().filter(|i| **i != tip);
+        let mut far: BinaryHeap<Far> = others.map(|i| Far(self.distance[*i], *i as u32)).collect();
+        let mut next = first + 1;
+        let end = first + wanted(&nodes).clamp(1, nodes.len()) as u32;
+        while next < end
+            && let Some(mut farthest) = far.peek_mut()
         {
-            let now = self.distance[node as usize];
-            if now < distance {
-                // Distances only shrink: each entry returns at most once per seed that changed it.
-                far.push(Far(now, node));
-            } else if seeds.insert(node as usize) {
-                self.seed(node as usize, first + seeds.len() as u32 - 1);
+            let node = farthest.1 as usize;
+            if self.distance[node] < farthest.0 {
+                // Distances only shrink: each entry comes up at most once per seed that changed it.
+                farthest.0 = self.distance[node];
+                continue;
+            }
+            PeekMut::pop(farthest);
+            self.seed(node, next);
+            self.seeds.push(node);
+            next += 1;
+        }
+        next
+    }
+
+    /// Cuts all components without cells.
+    fn all(&mut self, wanted: impl Fn(&[usize]) -> usize) -> usize {
+        let mut count = 0;
+        for start in 0..self.of.len() {
+            if self.of[start] == NO_CELL {
+                count = self.component(start, count, &wanted);
             }
         }
-        first + seeds.len() as u32
+        count as usize
     }
 }
 
-/// Cells of `graph`: in every connected component `wanted(node, size)` of them (`node` is its first one), at least
-/// one and at most `size`. Cells are numbered component by component.
-pub(super) fn farthest_first<G: Graph>(graph: &G, wanted: impl Fn(usize, usize) -> usize) -> Cells {
+/// Cells of `graph`: in every connected component `wanted(nodes)` of them (the nodes ascend), at least one and at most
+/// as many as there are nodes. Cells are numbered component by component.
+pub(super) fn farthest_first<G: Graph>(graph: &G, wanted: impl Fn(&[usize]) -> usize) -> Cells {
     let mut growth = Growth::new(graph);
-    let mut count = 0;
-    for start in 0..graph.len() {
-        if growth.of[start] == NO_CELL {
-            count = growth.component(start, count, &wanted);
-        }
+    let count = growth.all(wanted);
+    Cells { of: growth.of, count }
+}
+
+/// The seeds of [`farthest_first`], in the order of their cells.
+pub(super) fn seeds<G: Graph>(graph: &G, wanted: impl Fn(&[usize]) -> usize) -> Vec<usize> {
+    let mut growth = Growth::new(graph);
+    growth.all(wanted);
+    growth.seeds
+}
+
+/// The cells of these seeds, one or more in each component: every node belongs to the nearest one.
+pub(super) fn nearest<G: Graph>(graph: &G, seeds: &[usize]) -> Cells {
+    let (mut distance, mut of) = (vec![f64::INFINITY; graph.len()], vec![NO_CELL; graph.len()]);
+    let mut heap = BinaryHeap::new();
+    for (seed, cell) in seeds.iter().zip(0..) {
+        (distance[*seed], of[*seed]) = (0.0, cell);
+        heap.push(At { distance: 0.0, node: *seed as u32 });
     }
-    Cells { of: growth.of, count: count as usize }
+    // Ends because a node is visited only with a distance below its last one.
+    while let Some(At { distance: so_far, node }) = heap.pop() {
+        let node = node as usize;
+        if so_far > distance[node] {
+            continue;
+        }
+        graph.each_neighbour(node, |other, step| {
+            if so_far + step < distance[other] {
+                (distance[other], of[other]) = (so_far + step, of[node]);
+                heap.push(At { distance: so_far + step, node: other as u32 });
+            }
+        });
+    }
+    Cells { of, count: seeds.len() }
 }
 
 /// A node by its distance; the greatest is the farthest one, ties go to the least node.
@@ -196,7 +241,7 @@ pub(super) fn bisect_until<G: Graph>(graph: &G, mut cells: Cells, mut fine: impl
         let mut count = cells.count as u32;
         for node in coarse {
             if growth.of[node] == NO_CELL {
-                count = growth.component(node, count, |_, _| 2);
+                count = growth.component(node, count, |_| 2);
             }
         }
         cells = Cells::renumbered(growth.of);

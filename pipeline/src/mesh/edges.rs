@@ -1,7 +1,7 @@
 //! Which triangles meet along which edge. The table never sees positions, and takes any triangulation:
 //! non-manifold and inconsistently oriented ones too.
 
-use crate::id::{EdgeId, HalfEdgeId, VertexId};
+use crate::id::{EdgeId, FaceId, HalfEdgeId, VertexId};
 
 /// The edges of a triangulation, each with the half-edges that run along it in either direction.
 ///
@@ -47,6 +47,27 @@ impl EdgeTable {
                 table.starts.push(table.sides.len() as u32);
             }
             table.edge_of.push(number[group as usize]);
+        }
+        table
+    }
+
+    /// The table of a part of the triangulation: of `faces`, ascending, of which `local` tells the place in the part.
+    /// It is the table that [`Self::new`] would find, without the sort.
+    pub(crate) fn part(&self, faces: &[FaceId], local: impl Fn(FaceId) -> Option<FaceId>) -> Self {
+        let mut table = Self { edge_of: Vec::with_capacity(3 * faces.len()), starts: vec![0], sides: Vec::new() };
+        let inside = |h: &HalfEdgeId| Some(HalfEdgeId::side_of(local(h.face())?, h.side()));
+        for h in faces.iter().flat_map(|f| [0, 1, 2].map(|k| HalfEdgeId::side_of(*f, k))) {
+            let mut sides = self.sides(self.edge(h)).iter().filter_map(inside).peekable();
+            // Sides ascend: the first one meets the edge first.
+            let edge = match sides.peek().and_then(|first| table.edge_of.get(first.index())) {
+                Some(known) => *known,
+                None => {
+                    table.sides.extend(sides);
+                    table.starts.push(table.sides.len() as u32);
+                    EdgeId::at(table.starts.len() - 2)
+                }
+            };
+            table.edge_of.push(edge);
         }
         table
     }
@@ -106,6 +127,19 @@ mod tests {
         assert_eq!(table.sides(shared), [HalfEdgeId(2), HalfEdgeId(3), HalfEdgeId(6)]);
         assert_eq!(table.twin(HalfEdgeId(2)), None);
         assert!(table.is_boundary(HalfEdgeId(0)));
+    }
+
+    #[test]
+    fn the_table_of_a_part_is_found_anew() {
+        let all = [[0, 1, 2], [0, 2, 3], [2, 0, 4], [4, 0, 1], [4, 3, 2], [1, 2, 4]].map(ids);
+        let table = EdgeTable::new(&all);
+        for chosen in 0..64_usize {
+            let faces: Vec<FaceId> = (0..6).filter(|f| chosen >> f & 1 == 1).map(FaceId::at).collect();
+            let triangles: Vec<_> = faces.iter().map(|f| all[f.index()]).collect();
+            let part = table.part(&faces, |f| faces.binary_search(&f).ok().map(FaceId::at));
+            let anew = EdgeTable::new(&triangles);
+            assert_eq!((part.edge_of, part.starts, part.sides), (anew.edge_of, anew.starts, anew.sides));
+        }
     }
 
     #[test]

@@ -1,0 +1,128 @@
+//! Cells on a large graph: seeds are chosen among patches of nodes, then every node goes to its nearest seed.
+//!
+//! Choosing the farthest node again and again costs several sweeps over the graph, and a heap of all nodes. Where
+//! there are many nodes to a cell, seeds need not be the very farthest: it is enough to choose among patches of a few
+//! nodes, at distances that are those of paths from patch to patch. The cells themselves are found by one sweep from
+//! all seeds, and are as exact as if seeds had been chosen among nodes.
+
+use super::voronoi::{Cells, Graph, nearest, seeds};
+
+/// Patches to a cell.
+const SAMPLES: usize = 16;
+
+const NONE: u32 = u32::MAX;
+
+/// Cells of `graph`, numbered component by component: in a component of so many nodes `wanted` of them, or as many as
+/// it has nodes.
+pub(super) fn compact_cells<G: Graph>(graph: &G, wanted: impl Fn(usize) -> usize) -> Cells {
+    let patches = Patches::new(graph, |size| size / (SAMPLES * wanted(size)).max(1));
+    let seeds = seeds(&patches, |part| wanted(part.iter().map(|p| patches.size(*p)).sum()));
+    let nodes: Vec<usize> = seeds.iter().map(|p| patches.nodes[patches.starts[*p]] as usize).collect();
+    nearest(graph, &nodes)
+}
+
+/// Connected patches of nodes, and the graph of them.
+struct Patches {
+    /// Nodes patch by patch, each from its middle outwards; where each patch starts, and one more.
+    nodes: Vec<u32>,
+    starts: Vec<usize>,
+    /// The patches beside each one, with the lengths of paths between their first nodes.
+    beside: Vec<(u32, f64)>,
+    beside_starts: Vec<usize>,
+}
+
+impl Patches {
+    /// Patches of about `size(nodes)` nodes in a component of so many nodes, at least 1.
+    fn new<G: Graph>(graph: &G, size: impl Fn(usize) -> usize) -> Self {
+        let mut made = Self { nodes: Vec::new(), starts: vec![0], beside: Vec::new(), beside_starts: vec![0] };
+        let mut seen = vec![false; graph.len()];
+        let mut patch_of = vec![NONE; graph.len()];
+        let mut distance = vec![0.0; graph.len()];
+        for start in 0..graph.len() {
+            if !seen[start] {
+                let component = component(graph, start, &mut seen);
+                let size = size(component.len()).max(1);
+                for node in component {
+                    made.gather(graph, node, size, &mut patch_of, &mut distance);
+                }
+            }
+        }
+        made.link(graph, &patch_of, &distance);
+        made
+    }
+
+    /// Makes a patch around `first`, unless it is in one: breadth first, up to `size` nodes.
+    fn gather<G: Graph>(&mut self, graph: &G, first: u32, size: usize, patch_of: &mut [u32], distance: &mut [f64]) {
+        if patch_of[first as usize] != NONE {
+            return;
+        }
+        let (start, patch) = (self.nodes.len(), self.starts.len() as u32 - 1);
+        patch_of[first as usize] = patch;
+        self.nodes.push(first);
+        let mut next = start;
+        while next < self.nodes.len() {
+            let node = self.nodes[next] as usize;
+            let nodes = &mut self.nodes;
+            graph.each_neighbour(node, |other, step| {
+                if patch_of[other] == NONE && nodes.len() < start + size {
+                    (patch_of[other], distance[other]) = (patch, distance[node] + step);
+                    nodes.push(other as u32);
+                }
+            });
+            next += 1;
+        }
+        self.starts.push(self.nodes.len());
+    }
+
+    fn link<G: Graph>(&mut self, graph: &G, patch_of: &[u32], distance: &[f64]) {
+        for patch in 0..self.len() {
+            let first = self.beside.len();
+            let beside = &mut self.beside;
+            for node in self.nodes[self.starts[patch]..self.starts[patch + 1]].iter().map(|n| *n as usize) {
+                graph.each_neighbour(node, |other, step| {
+                    let (to, length) = (patch_of[other], distance[node] + step + distance[other]);
+                    if to == patch as u32 {
+                        return;
+                    }
+                    // A patch has few neighbours.
+                    match beside[first..].iter_mut().find(|b| b.0 == to) {
+                        Some(known) => known.1 = known.1.min(length),
+                        None => beside.push((to, length)),
+                    }
+                });
+            }
+            self.beside_starts.push(self.beside.len());
+        }
+    }
+
+    fn size(&self, patch: usize) -> usize {
+        self.starts[patch + 1] - self.starts[patch]
+    }
+}
+
+impl Graph for Patches {
+    fn len(&self) -> usize {
+        self.starts.len() - 1
+    }
+
+    fn each_neighbour(&self, node: usize, mut visit: impl FnMut(usize, f64)) {
+        let range = self.beside_starts[node]..self.beside_starts[node + 1];
+        self.beside[range].iter().for_each(|(to, length)| visit(*to as usize, *length));
+    }
+}
+
+/// The nodes that can be reached from `start`, breadth first.
+fn component<G: Graph>(graph: &G, start: usize, seen: &mut [bool]) -> Vec<u32> {
+    let mut nodes = vec![start as u32];
+    seen[start] = true;
+    let mut next = 0;
+    while next < nodes.len() {
+        graph.each_neighbour(nodes[next] as usize, |other, _| {
+            if !std::mem::replace(&mut seen[other], true) {
+                nodes.push(other as u32);
+            }
+        });
+        next += 1;
+    }
+    nodes
+}
