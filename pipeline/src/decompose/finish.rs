@@ -1,6 +1,7 @@
 //! From labels to an atlas: straight seams, as far as the predicted area ratio allows, and well chosen outer loops.
 
 use super::assemble::assemble;
+use super::clearance::{Gaps, gaps};
 use super::dual::Dual;
 use super::judge::{Verdict, choose_outer, judge};
 use super::merge::Limits;
@@ -14,6 +15,9 @@ use crate::id::HalfEdgeId;
 /// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
 /// seams along a tube come together. So the area ratio is foretold again after every step, and the last good one kept.
 const BANDS: [f64; 3] = [0.5, 1.0, 2.0];
+
+/// How far seams may be straightened, as a share of the narrowest gap beside them.
+const SHARE: f64 = 0.3;
 
 /// The parts of seams that are tried one after the other where not all can be straightened at once.
 const PARTS: usize = 8;
@@ -30,13 +34,16 @@ pub(super) fn finish(
     let mut best = Judged::new(Network::new(dual, labels, limits), cells);
     let bands = if best.network.has_seams() { &BANDS[..] } else { &[] };
     for band in bands {
-        let breadth = |h: HalfEdgeId| band * size(h);
-        let Err(bad) = best.step(cells, limits, settings.max_area_ratio, breadth) else { continue };
+        let gaps = gaps(&best.network);
+        let clear = |h: HalfEdgeId| SHARE * gaps.clearance[dual.from(h)].min(gaps.clearance[dual.to(h)]);
+        let breadth = |h: HalfEdgeId| clear(h).min(band * size(h));
+        let Err(bad) = best.step(cells, limits, settings.max_area_ratio, &gaps, breadth) else { continue };
         // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
         for part in 0..PARTS {
             let part_of = best.parts(&bad);
-            let breadth = |h: HalfEdgeId| if part_of(h).is_none_or(|p| p == part) { band * size(h) } else { 0.0 };
-            let _kept_or_left = best.step(cells, limits, settings.max_area_ratio, breadth);
+            let breadth =
+                |h: HalfEdgeId| if part_of(h).is_none_or(|p| p == part) { clear(h).min(band * size(h)) } else { 0.0 };
+            let _kept_or_left = best.step(cells, limits, settings.max_area_ratio, &gaps, breadth);
         }
     }
     let Judged { network, verdicts } = best;
@@ -64,10 +71,11 @@ impl<'a> Judged<'a> {
         cells: &Cells,
         limits: Limits,
         largest: f64,
+        gaps: &Gaps,
         breadth: impl Fn(HalfEdgeId) -> f64,
     ) -> Result<(), Vec<u32>> {
         let mut network = Network::new(self.network.dual, self.network.labels.clone(), limits);
-        straighten(&mut network, breadth);
+        straighten(&mut network, &gaps.crossing, breadth);
         let straight = Self::new(network, cells);
         let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
         let worse = |(new, old): (&Option<Verdict>, &Option<Verdict>)| ratio(new) > largest.max(ratio(old));

@@ -17,6 +17,7 @@
 //! sorting, but for a fixed number of cells; every loop has its reason to end beside it.
 
 mod assemble;
+mod clearance;
 mod complex;
 mod dual;
 mod ears;

@@ -66,6 +66,8 @@ pub(super) struct Bounds<'a> {
     pub length: f64,
     /// Through these vertices.
     pub band: &'a [bool],
+    /// Not along these edges.
+    pub barred: &'a [bool],
 }
 
 impl Tree {
@@ -212,6 +214,7 @@ impl Bounds<'_> {
         };
         let free = network.degree(to) == 0 && self.band[to] && !network.is_open(to);
         (free || may_end(to) && !network.is_seam(h))
+            && !self.barred[network.dual.mesh.edges().edge(h).index()]
             && (!at_root || inside(h) && network.dual.across(h).is_some_and(inside))
     }
 }

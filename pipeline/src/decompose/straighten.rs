@@ -33,19 +33,23 @@ struct Straightening<'n, 'a> {
     reach: f64,
     /// Per vertex, whether it is near enough to the first seams.
     band: Vec<bool>,
+    /// Per edge, whether no seam may move along it.
+    barred: &'n [bool],
     /// The seams, and the corners with their seams, that were tried in vain: they are not tried again before they
     /// have changed.
     vain: BTreeSet<(Option<usize>, Vec<HalfEdgeId>)>,
 }
 
-/// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges.
-pub(super) fn straighten(network: &mut Network, breadth: impl Fn(HalfEdgeId) -> f64) {
+/// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges, nor along a
+/// `barred` edge.
+pub(super) fn straighten(network: &mut Network, barred: &[bool], breadth: impl Fn(HalfEdgeId) -> f64) {
     let dual = network.dual;
     let tree = || Tree::new(dual);
     let area: f64 = (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum();
     let reach = REACH * (area / network.charts().max(1) as f64).sqrt();
     let band = band(network, breadth);
-    let mut work = Straightening { network, dual, trees: [tree(), tree(), tree()], reach, band, vain: BTreeSet::new() };
+    let trees = [tree(), tree(), tree()];
+    let mut work = Straightening { network, dual, trees, reach, band, barred, vain: BTreeSet::new() };
     for _ in 0..ROUNDS {
         let before = work.total();
         work.seams();
@@ -109,8 +113,13 @@ impl Straightening<'_, '_> {
         let labels = [left, right];
         let before = length(self.dual, path);
         self.network.lift(path);
-        let bounds =
-            Bounds { goal: Goal::Vertex(to), labels: &labels, length: (1.0 - GAIN) * before, band: &self.band };
+        let bounds = Bounds {
+            goal: Goal::Vertex(to),
+            labels: &labels,
+            length: (1.0 - GAIN) * before,
+            band: &self.band,
+            barred: self.barred,
+        };
         self.trees[0].grow(self.network, from, &bounds);
         let found = self.trees[0].distance(to).map(|_| self.trees[0].path(self.dual, to));
         let Some(half_edges) = found else {
@@ -190,7 +199,8 @@ impl Straightening<'_, '_> {
     fn meeting(&mut self, ends: &[usize], labels: &[u32], before: f64) -> Option<Vec<Vec<HalfEdgeId>>> {
         let length = (1.0 - GAIN) * before;
         let [first, second, third] = &mut self.trees;
-        let meeting = |a, b| Bounds { goal: Goal::Meeting([a, b]), labels, length, band: &self.band };
+        let meeting =
+            |a, b| Bounds { goal: Goal::Meeting([a, b]), labels, length, band: &self.band, barred: self.barred };
         first.grow(self.network, ends[0], &meeting((ends[1], None), (ends[2], None)));
         second.grow(self.network, ends[1], &meeting((ends[0], Some(first)), (ends[2], None)));
         third.grow(self.network, ends[2], &meeting((ends[0], Some(first)), (ends[1], Some(second))));
@@ -213,8 +223,13 @@ impl Straightening<'_, '_> {
         let labels = [left, right];
         let before = length(self.dual, arm);
         self.network.lift(arm);
-        let bounds =
-            Bounds { goal: Goal::OpenLoop(end), labels: &labels, length: (1.0 - GAIN) * before, band: &self.band };
+        let bounds = Bounds {
+            goal: Goal::OpenLoop(end),
+            labels: &labels,
+            length: (1.0 - GAIN) * before,
+            band: &self.band,
+            barred: self.barred,
+        };
         let tree = &mut self.trees[0];
         tree.grow(self.network, root, &bounds);
         let open = tree.settled.last().copied().filter(|v| *v != root && self.network.on_one_loop(*v, end));
@@ -227,7 +242,8 @@ impl Straightening<'_, '_> {
     }
 }
 
-/// The vertices no farther from a seam than `breadth` at one of its half-edges. Dijkstra by what is left of it.
+/// The vertices on seams, and those no farther from one than `breadth` at one of its half-edges. Dijkstra by what is
+/// left of it.
 fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Vec<bool> {
     let dual = network.dual;
     let mut left = vec![0.0_f64; dual.mesh.points().len()];
@@ -251,5 +267,5 @@ fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Vec<bool> {
             }
         });
     }
-    left.into_iter().map(|l| l > 0.0).collect()
+    left.into_iter().enumerate().map(|(v, l)| l > 0.0 || network.degree(v) > 0).collect()
 }

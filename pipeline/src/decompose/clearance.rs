@@ -1,0 +1,111 @@
+//! How close seams come to each other, and to the open boundary, other than along themselves.
+//!
+//! A chart that narrows to a neck has an area ratio that grows exponentially with the length of the neck over its width.
+//! So seams may only move by a share of the distance to the next one. Every vertex belongs to the nearest seam vertex;
+//! where the domains of two of them meet that are far apart along the seams, the way across is a gap.
+
+use super::network::Network;
+use super::voronoi::At;
+use crate::id::HalfEdgeId;
+use std::collections::BinaryHeap;
+
+/// Two vertices of seams are far apart if the way along these is this many times the way across.
+const FAR: f64 = 3.0;
+
+/// The gaps between seams.
+pub(super) struct Gaps {
+    /// Per vertex on a seam the width of the narrowest gap beside it, infinite where there is none.
+    pub clearance: Vec<f64>,
+    /// Per edge, whether it crosses the middle of a gap: no seam may move along it.
+    pub crossing: Vec<bool>,
+}
+
+pub(super) fn gaps(network: &Network) -> Gaps {
+    let dual = network.dual;
+    let places = places(network);
+    let (distance, owner) = domains(network, &places);
+    let mut clearance = vec![f64::INFINITY; places.len()];
+    let mut crossing = vec![false; dual.mesh.edges().len()];
+    for h in dual.half_edges() {
+        let (u, v) = (dual.from(h), dual.to(h));
+        let (Some(a), Some(b)) = (owner[u], owner[v]) else { continue };
+        let gap = distance[u] + dual.length(h) + distance[v];
+        if a != b && along(&places[a as usize], &places[b as usize]) > FAR * gap {
+            crossing[dual.mesh.edges().edge(h).index()] = true;
+            for o in [a as usize, b as usize] {
+                clearance[o] = clearance[o].min(gap);
+            }
+        }
+    }
+    Gaps { clearance, crossing }
+}
+
+/// Where a vertex lies on the seams: the seam, the way to its begin and to its end, and whether it is closed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Place {
+    Inside,
+    Open,
+    Seam { curve: usize, from_begin: f64, to_end: f64, closed: bool },
+}
+
+fn places(network: &Network) -> Vec<Place> {
+    let dual = network.dual;
+    let vertex = |v: usize| if network.is_open(v) { Place::Open } else { Place::Inside };
+    let mut places: Vec<Place> = (0..dual.mesh.points().len()).map(vertex).collect();
+    for (curve, path) in network.curves().iter().enumerate() {
+        let total: f64 = path.iter().map(|h| dual.length(*h)).sum();
+        let closed = dual.from(path[0]) == dual.to(path[path.len() - 1]);
+        let mut from_begin = 0.0;
+        for h in path {
+            places[dual.from(*h)] = Place::Seam { curve, from_begin, to_end: total - from_begin, closed };
+            from_begin += dual.length(*h);
+            if !closed {
+                places[dual.to(*h)] = Place::Seam { curve, from_begin, to_end: total - from_begin, closed };
+            }
+        }
+    }
+    places
+}
+
+/// The way along the seams between two places, or less.
+fn along(a: &Place, b: &Place) -> f64 {
+    let to_end = |p: &Place| match p {
+        Place::Seam { from_begin, to_end, closed: false, .. } => from_begin.min(*to_end),
+        Place::Seam { .. } => f64::INFINITY,
+        Place::Open | Place::Inside => 0.0,
+    };
+    match (a, b) {
+        (Place::Open, Place::Open) => 0.0,
+        (Place::Seam { curve: c, from_begin: s, to_end, closed }, Place::Seam { curve: d, from_begin: t, .. })
+            if c == d =>
+        {
+            let way = (s - t).abs();
+            if *closed { way.min(s + to_end - way) } else { way }
+        }
+        _ => to_end(a) + to_end(b),
+    }
+}
+
+/// Per vertex its distance from the nearest vertex on a seam or at the open boundary, and that vertex.
+fn domains(network: &Network, places: &[Place]) -> (Vec<f64>, Vec<Option<u32>>) {
+    let dual = network.dual;
+    let (mut distance, mut owner) = (vec![f64::INFINITY; places.len()], vec![None; places.len()]);
+    let mut heap = BinaryHeap::new();
+    for v in (0..places.len()).filter(|v| places[*v] != Place::Inside) {
+        (distance[v], owner[v]) = (0.0, Some(v as u32));
+        heap.push(At { distance: 0.0, node: v as u32 });
+    }
+    while let Some(At { distance: so_far, node }) = heap.pop() {
+        if so_far > distance[node as usize] {
+            continue;
+        }
+        network.each_out(node as usize, |h: HalfEdgeId| {
+            let (to, length) = (dual.to(h), so_far + dual.length(h));
+            if length < distance[to] {
+                (distance[to], owner[to]) = (length, owner[node as usize]);
+                heap.push(At { distance: length, node: to as u32 });
+            }
+        });
+    }
+    (distance, owner)
+}
