@@ -110,6 +110,7 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64) -> Result<Ma
     let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary));
     if let Some(Ok(map)) = &harmonic
         && max_area_ratio.is_finite()
+        && map.invalid().len() <= chart.triangles().len() / FEW_INVALID
     {
         let ratio = distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n]));
         if ratio > max_area_ratio {
@@ -118,6 +119,10 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64) -> Result<Ma
     }
     Ok(MappedChart { closed, linear, start, certified_start, harmonic })
 }
+
+/// The harmonic map's own ratio is looked at where at most one in so many triangles is invalid: areas of many invalid
+/// ones say nothing.
+const FEW_INVALID: usize = 100;
 
 /// Maps may reach this share of the largest area ratio: untangling changes it a little.
 const MARGIN: f64 = 0.8;

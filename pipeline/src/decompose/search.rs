@@ -15,8 +15,16 @@ const COMPACT: Weights = Weights { ratio: 0.5, roundness: 0.6, spread: 0.5, shar
 const SHORT: Weights = Weights { ratio: 0.3, roundness: 1.0, spread: 0.5, shared: 3.0 };
 
 /// Regions per component to begin with, and weights.
-const WAYS: [(usize, Weights); 6] =
-    [(48, BALANCED), (96, BALANCED), (160, BALANCED), (96, COMPACT), (160, COMPACT), (96, SHORT)];
+const WAYS: [(usize, Weights); 8] = [
+    (48, BALANCED),
+    (72, BALANCED),
+    (96, BALANCED),
+    (128, BALANCED),
+    (160, BALANCED),
+    (96, COMPACT),
+    (160, COMPACT),
+    (96, SHORT),
+];
 
 /// What seams as long as the square root of the area count, against a decade of the worst area ratio. (They will be a
 /// third shorter when they are straight.)
