@@ -23,6 +23,7 @@ mod straighten;
 mod voronoi;
 
 use crate::atlas::Atlas;
+use crate::id::HalfEdgeId;
 use crate::mesh::{Census, SurfaceMesh};
 pub use assemble::assemble;
 use complex::Complex;
@@ -91,22 +92,36 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
     let graph = CellGraph::new(&complex);
     let charts = Search { complex: &complex, graph: &graph, limits }.run();
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
-    let mut network = Network::new(&dual, labels, limits);
-    let mut verdicts = judge(&network, &cells);
-    let bands = if network.has_seams() { &BANDS[..] } else { &[] };
-    for band in bands {
-        let mut straight = Network::new(&dual, network.labels.clone(), limits);
-        straighten(&mut straight, |h| band * graph.area(cells.of[h.face().index()]).sqrt());
-        let found = judge(&straight, &cells);
+    let breadth = |h: HalfEdgeId| graph.area(cells.of[h.face().index()]).sqrt();
+    let (network, verdicts) = straightened(Network::new(&dual, labels, limits), &cells, breadth, settings);
+    let mut atlas = assemble(mesh, &network.labels)?;
+    choose_outer(&mut atlas, &verdicts);
+    Ok(atlas)
+}
+
+/// The network with straight seams, and what is foretold of its charts. Step by step: the last one that was good is
+/// kept, and there is none after one that gained little.
+fn straightened<'a>(
+    mut network: Network<'a>,
+    cells: &Cells,
+    breadth: impl Fn(HalfEdgeId) -> f64,
+    settings: &Settings,
+) -> (Network<'a>, Vec<Option<Verdict>>) {
+    let mut verdicts = judge(&network, cells);
+    for band in BANDS {
+        let mut straight = network.begun_anew();
+        let more = straight.seams().next().is_some() && straighten(&mut straight, |h| band * breadth(h));
+        let found = if straight.labels == network.labels { break } else { judge(&straight, cells) };
         let fits = |v: &Option<Verdict>| v.is_none_or(|v| v.ratio <= settings.max_area_ratio);
         if !straight.is_sound() || !found.iter().all(fits) {
             break;
         }
         (network, verdicts) = (straight, found);
+        if !more {
+            break;
+        }
     }
-    let mut atlas = assemble(mesh, &network.labels)?;
-    choose_outer(&mut atlas, &verdicts);
-    Ok(atlas)
+    (network, verdicts)
 }
 
 /// Legal cells of about the same size, and their complex.

@@ -24,6 +24,7 @@ pub(super) struct Path {
 }
 
 /// Labels and seams.
+#[derive(Clone)]
 pub(super) struct Network<'a> {
     pub dual: &'a Dual<'a>,
     pub labels: Vec<u32>,
@@ -47,6 +48,7 @@ pub(super) struct Network<'a> {
 }
 
 /// Marks that are cleared by counting on.
+#[derive(Clone)]
 struct Marks {
     now: u32,
     faces: Vec<u32>,
@@ -96,6 +98,11 @@ impl<'a> Network<'a> {
             made.count_inside(v, 1);
         }
         made
+    }
+
+    /// The same charts, with the areas that they have now to begin with.
+    pub(super) fn begun_anew(&self) -> Self {
+        Self { least: self.areas.iter().map(|a| LEAST * a).collect(), ..self.clone() }
     }
 
     /// Makes the edge along `h` a seam or none.
@@ -208,9 +215,9 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Whether there is a seam.
-    pub(super) fn has_seams(&self) -> bool {
-        self.seam.contains(&true)
+    /// The half-edges of all seams, on both sides, chart by chart.
+    pub(super) fn seams(&self) -> impl Iterator<Item = HalfEdgeId> {
+        self.boundaries.iter().flatten().copied().filter(|h| self.is_seam(*h))
     }
 
     /// The number of charts.
@@ -227,9 +234,7 @@ impl<'a> Network<'a> {
     pub(super) fn curves(&self) -> Vec<Vec<HalfEdgeId>> {
         let mut seen = vec![false; self.dual.mesh.edges().len()];
         let edge = |h: HalfEdgeId| self.dual.mesh.edges().edge(h).index();
-        let starts: Vec<HalfEdgeId> = self.dual.half_edges().filter(|h| self.is_seam(*h)).collect();
-        let (at_corners, elsewhere): (Vec<_>, Vec<_>) =
-            starts.into_iter().partition(|h| self.is_corner(self.dual.from(*h)));
+        let (at_corners, elsewhere): (Vec<_>, Vec<_>) = self.seams().partition(|h| self.is_corner(self.dual.from(*h)));
         let mut curves = Vec::new();
         for h in at_corners.into_iter().chain(elsewhere) {
             if !seen[edge(h)] {
