@@ -190,6 +190,21 @@ pub fn sphere(n: u32) -> TriangleSoup {
     soup(points, triangles)
 }
 
+/// A torus of `around` x `along` (at least 3 each) squares.
+pub fn torus(around: u32, along: u32) -> TriangleSoup {
+    let angle = |i: u32, n: u32| TAU * f64::from(i) / f64::from(n);
+    let point = |i: u32, j: u32| {
+        let (sin, cos) = angle(i, around).sin_cos();
+        let r = 1.0 + 0.4 * angle(j, along).cos();
+        [r * cos, r * sin, 0.4 * angle(j, along).sin()]
+    };
+    let at = |i: u32, j: u32| i % around * along + j % along;
+    let squares = (0..around).flat_map(|i| (0..along).map(move |j| (i, j)));
+    let points = squares.clone().map(|(i, j)| point(i, j)).collect();
+    let halves = |(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
+    soup(points, squares.flat_map(halves).collect())
+}
+
 /// A finger: a disk whose middle is drawn out to a closed tube of height `length` (in diameters of the tube).
 /// Its map needs an area ratio of about e^(4 `length`).
 pub fn finger(around: u32, length: u32) -> TriangleSoup {
@@ -221,16 +236,22 @@ pub fn finger(around: u32, length: u32) -> TriangleSoup {
 }
 
 /// The pseudo-random numbers of SplitMix64 (Steele, Lea and Flood 2014, doi 10.1145/2660193.2660195).
-struct Random(u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
     /// A number between -1 and 1.
-    fn symmetric(&mut self) -> f64 {
+    pub(crate) fn symmetric(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// A number below `n`.
+    #[cfg(test)]
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        ((0.5 + 0.5 * self.symmetric()) * n as f64) as usize % n
     }
 }
 
@@ -258,6 +279,7 @@ mod tests {
         check(sliver_strip(12), 1, 1, Some(0), true);
         check(cracked_patch(), 1, 1, Some(0), true);
         check(sphere(6), 1, 0, Some(0), true);
+        check(torus(7, 5), 1, 0, Some(1), true);
         check(finger(12, 2), 1, 1, Some(0), true);
     }
 }

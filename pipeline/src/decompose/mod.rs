@@ -10,6 +10,7 @@ mod assemble;
 mod complex;
 mod dual;
 mod judge;
+mod lay;
 mod ldl;
 mod legality;
 mod merge;

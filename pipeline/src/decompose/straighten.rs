@@ -6,7 +6,8 @@
 //! falls with every change, and the number of rounds is fixed.
 
 use super::dual::Dual;
-use super::network::{Network, Path};
+use super::lay::Path;
+use super::network::Network;
 use super::shortest::{Bounds, Goal, Tree, length, reversed, weight};
 use super::voronoi::At;
 use crate::id::HalfEdgeId;
