@@ -259,16 +259,22 @@ pub fn finger(around: u32, length: u32) -> TriangleSoup {
 }
 
 /// The pseudo-random numbers of SplitMix64 (Steele, Lea and Flood 2014, doi 10.1145/2660193.2660195).
-struct Random(u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
     /// A number between -1 and 1.
-    fn symmetric(&mut self) -> f64 {
+    pub(crate) fn symmetric(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// A number below `n`.
+    #[cfg(test)]
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        ((0.5 + 0.5 * self.symmetric()) * n as f64) as usize % n
     }
 }
 
@@ -296,6 +302,7 @@ mod tests {
         check(sliver_strip(12), 1, 1, Some(0), true);
         check(cracked_patch(), 1, 1, Some(0), true);
         check(sphere(6), 1, 0, Some(0), true);
+        check(torus(7, 5), 1, 0, Some(1), true);
         check(finger(12, 2), 1, 1, Some(0), true);
         check(ring_torus(9, 6), 1, 0, Some(1), true);
         check(book(3, 4), 3, 3, Some(0), true);

@@ -215,3 +215,93 @@ impl<'a> Tracer<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decompose::legality;
+    use crate::decompose::patches::compact_cells;
+    use crate::decompose::regions::Regions;
+    use crate::id::{ChartId, FaceId, VertexId};
+    use crate::mesh::{Census, EdgeTable, SurfaceMesh, TriangleSoup, Umbrellas};
+    use crate::repair::{Settings, repair};
+    use crate::shapes::{self, Random};
+
+    fn surface(soup: &TriangleSoup) -> SurfaceMesh {
+        repair(soup, &Settings::default()).expect("a surface is left").mesh
+    }
+
+    /// Compares what a region is said to be with what its triangles tell. Cells may be illegal themselves.
+    fn compare(dual: &Dual, cells: &Cells, regions: &mut Regions, region: u32) {
+        let (outline, known) = (regions.outline_of(region), regions.all[region as usize].clone());
+        let shape = regions.shape(&known, &outline);
+        let own = |f: &usize| known.cells.contains(&cells.of[*f]);
+        let faces: Vec<FaceId> = (0..cells.of.len()).filter(own).map(FaceId::at).collect();
+        let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| dual.mesh.triangles()[f.index()]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let local = |v: VertexId| VertexId::at(vertices.partition_point(|u| *u < v));
+        let triangles: Vec<_> = faces.iter().map(|f| dual.mesh.triangles()[f.index()].map(local)).collect();
+        let edges = EdgeTable::new(&triangles);
+        let legal = legality::verify(ChartId(0), &triangles, &edges, vertices.len()).is_ok();
+        assert_eq!((shape.faces, shape.is_chart()), (faces.len(), legal), "{shape:?}");
+        let census = Census::new(&triangles, &edges);
+        let at_rim = |h: &HalfEdgeId| dual.across(*h).is_none_or(|t| !own(&t.face().index()));
+        let rim: f64 = dual.half_edges().filter(|h| own(&h.face().index()) && at_rim(h)).map(|h| dual.length(h)).sum();
+        assert!((known.length - rim).abs() < 1e-9 * (1.0 + rim));
+        if census.orientable {
+            let opened = Umbrellas::new(&triangles, &edges).count;
+            let euler = opened as i64 - edges.len() as i64 + triangles.len() as i64;
+            assert_eq!((shape.euler, shape.loops), (euler, census.boundary_loops));
+            assert_eq!(shape.pinches > 0, opened > vertices.len());
+        }
+    }
+
+    #[test]
+    fn random_unions_are_what_their_triangles_are() {
+        let soups = [shapes::sphere(8), shapes::disk_with_holes(17, 3), shapes::ring_torus(14, 9), shapes::moebius(20)];
+        let meshes: Vec<SurfaceMesh> = soups.iter().chain([&shapes::finger(12, 2)]).map(surface).collect();
+        for (mesh, count) in meshes.iter().flat_map(|m| [3, 7, 25, 60].map(|count| (m, count))) {
+            let dual = Dual::new(mesh);
+            let cells = compact_cells(&dual, |_| count);
+            let complex = Complex::new(&dual, &cells);
+            let mut random = Random(count as u64);
+            let mut regions = Regions::new(&complex, (0..cells.count as u32).collect(), cells.count);
+            (0..cells.count as u32).for_each(|r| compare(&dual, &cells, &mut regions, r));
+            // Every union leaves one region less.
+            while let Some(a) = some_with_neighbours(&regions, &mut random) {
+                let beside: Vec<u32> = regions.neighbours(a).into_iter().filter(|b| *b != a).collect();
+                let b = beside[random.below(beside.len())];
+                let union = regions.union(a, b).expect("neighbours");
+                regions.unite(a, b, union);
+                compare(&dual, &cells, &mut regions, a);
+                let anew = Regions::new(&complex, regions.of_cell.clone(), regions.all.len());
+                assert_eq!(regions.all[a as usize].euler, anew.all[a as usize].euler);
+            }
+        }
+    }
+
+    fn some_with_neighbours(regions: &Regions, random: &mut Random) -> Option<u32> {
+        let apart = |r: &u32| regions.neighbours(*r).iter().any(|b| b != r);
+        let all: Vec<u32> = (0..regions.all.len() as u32).filter(apart).collect();
+        (!all.is_empty()).then(|| all[random.below(all.len())])
+    }
+
+    #[test]
+    fn half_arcs_are_two_sides_of_arcs_and_go_round_their_cells() {
+        for soup in [shapes::sphere(8), shapes::disk_with_holes(17, 3), shapes::ring_torus(14, 9)] {
+            let mesh = surface(&soup);
+            let dual = Dual::new(&mesh);
+            for count in [1, 2, 9, 40] {
+                let complex = Complex::new(&dual, &compact_cells(&dual, |_| count));
+                for (a, arc) in complex.arcs.iter().enumerate() {
+                    assert_eq!(complex.arcs[arc.next as usize].cell, arc.cell);
+                    let Some(twin) = complex.arcs.get(arc.twin as usize) else { continue };
+                    assert_eq!(twin.twin as usize, a);
+                    assert_eq!(twin.from, complex.arcs[arc.next as usize].from);
+                    assert!((twin.length - arc.length).abs() < 1e-12 && twin.cell != arc.cell);
+                }
+            }
+        }
+    }
+}

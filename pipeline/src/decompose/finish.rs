@@ -32,18 +32,18 @@ pub(super) fn finish(
     size: impl Fn(HalfEdgeId) -> f64,
 ) -> Result<Atlas, Error> {
     let mut best = Judged::new(Network::new(dual, labels, limits), cells);
-    let bands = if best.network.has_seams() { &BANDS[..] } else { &[] };
+    let bands = if best.network.seams().next().is_some() { &BANDS[..] } else { &[] };
     for band in bands {
         let gaps = gaps(&best.network);
         let clear = |h: HalfEdgeId| SHARE * gaps.clearance[dual.from(h)].min(gaps.clearance[dual.to(h)]);
         let breadth = |h: HalfEdgeId| clear(h).min(band * size(h));
-        let Err(bad) = best.step(cells, limits, settings.max_area_ratio, &gaps, breadth) else { continue };
+        let Err(bad) = best.step(cells, settings.max_area_ratio, &gaps, breadth) else { continue };
         // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
         for part in 0..PARTS {
             let part_of = best.parts(&bad);
             let breadth =
                 |h: HalfEdgeId| if part_of(h).is_none_or(|p| p == part) { clear(h).min(band * size(h)) } else { 0.0 };
-            let _kept_or_left = best.step(cells, limits, settings.max_area_ratio, &gaps, breadth);
+            let _kept_or_left = best.step(cells, settings.max_area_ratio, &gaps, breadth);
         }
     }
     let Judged { network, verdicts } = best;
@@ -69,12 +69,11 @@ impl<'a> Judged<'a> {
     fn step(
         &mut self,
         cells: &Cells,
-        limits: Limits,
         largest: f64,
         gaps: &Gaps,
         breadth: impl Fn(HalfEdgeId) -> f64,
     ) -> Result<(), Vec<u32>> {
-        let mut network = Network::new(self.network.dual, self.network.labels.clone(), limits);
+        let mut network = self.network.begun_anew();
         straighten(&mut network, &gaps.crossing, breadth);
         let straight = Self::new(network, cells);
         let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);

@@ -24,6 +24,7 @@ mod ears;
 mod features;
 mod finish;
 mod judge;
+mod lay;
 mod ldl;
 mod legality;
 mod merge;

@@ -1,12 +1,10 @@
 //! Charts as labels of triangles, and the seams between them: edges whose triangles bear different labels.
 //!
-//! Seams are moved by one operation: some of their edges are replaced by other paths, and the triangles between the
-//! old and the new ones change their labels. The operation is undone where a chart would not be legal any more.
+//! Seams are moved by one operation: see [`super::lay`].
 
 use super::dual::Dual;
 use super::merge::Limits;
-use super::regions::Shape;
-use crate::id::{FaceId, HalfEdgeId};
+use crate::id::HalfEdgeId;
 use crate::union_find::UnionFind;
 
 /// A chart keeps at least this share of its area.
@@ -15,26 +13,19 @@ const LEAST: f64 = 0.5;
 /// Marks vertices where the surface does not end.
 const INNER: u32 = u32::MAX;
 
-/// A path along edges: half-edges from end to end, with the label that shall lie on its left and on its right.
-#[derive(Clone, Debug)]
-pub(super) struct Path {
-    pub half_edges: Vec<HalfEdgeId>,
-    pub left: u32,
-    pub right: u32,
-}
-
 /// Labels and seams.
+#[derive(Clone)]
 pub(super) struct Network<'a> {
     pub dual: &'a Dual<'a>,
     pub labels: Vec<u32>,
-    limits: Limits,
+    pub limits: Limits,
     /// Per label, its area at first: it keeps at least half of it.
-    least: Vec<f64>,
-    areas: Vec<f64>,
+    pub least: Vec<f64>,
+    pub areas: Vec<f64>,
     /// Per label, its triangles, the vertices inside it, and the half-edges around it.
-    sizes: Vec<usize>,
-    inside: Vec<usize>,
-    boundaries: Vec<Vec<HalfEdgeId>>,
+    pub sizes: Vec<usize>,
+    pub inside: Vec<usize>,
+    pub boundaries: Vec<Vec<HalfEdgeId>>,
     /// Per edge, whether it is a seam.
     seam: Vec<bool>,
     /// Per vertex, the number of seam edges at it.
@@ -42,16 +33,17 @@ pub(super) struct Network<'a> {
     /// Per vertex, the open loop of the surface through it, or [`INNER`].
     open: Vec<u32>,
     /// Per vertex, one half-edge that begins there.
-    out: Vec<HalfEdgeId>,
-    marks: Marks,
+    pub out: Vec<HalfEdgeId>,
+    pub marks: Marks,
 }
 
 /// Marks that are cleared by counting on.
-struct Marks {
-    now: u32,
-    faces: Vec<u32>,
-    vertices: Vec<u32>,
-    half_edges: Vec<u32>,
+#[derive(Clone)]
+pub(super) struct Marks {
+    pub now: u32,
+    pub faces: Vec<u32>,
+    pub vertices: Vec<u32>,
+    pub half_edges: Vec<u32>,
 }
 
 impl<'a> Network<'a> {
@@ -98,6 +90,11 @@ impl<'a> Network<'a> {
         made
     }
 
+    /// The same charts, with the areas that they have now to begin with.
+    pub(super) fn begun_anew(&self) -> Self {
+        Self { least: self.areas.iter().map(|a| LEAST * a).collect(), ..self.clone() }
+    }
+
     /// Makes the edge along `h` a seam or none.
     fn mark_seam(&mut self, h: HalfEdgeId, seam: bool) {
         let edge = self.dual.mesh.edges().edge(h).index();
@@ -109,7 +106,7 @@ impl<'a> Network<'a> {
     }
 
     /// As [`Self::mark_seam`], with the count of inner vertices.
-    fn set_seam(&mut self, h: HalfEdgeId, seam: bool) {
+    pub(super) fn set_seam(&mut self, h: HalfEdgeId, seam: bool) {
         let ends = [self.dual.from(h), self.dual.to(h)];
         ends.iter().for_each(|v| self.count_inside(*v, -1));
         self.mark_seam(h, seam);
@@ -117,7 +114,7 @@ impl<'a> Network<'a> {
     }
 
     /// Counts a vertex (or no more) if it lies inside a chart: that of the triangle of its half-edge [`Self::out`].
-    fn count_inside(&mut self, vertex: usize, by: isize) {
+    pub(super) fn count_inside(&mut self, vertex: usize, by: isize) {
         if self.degree[vertex] == 0 && !self.is_open(vertex) {
             let count = &mut self.inside[self.labels[self.out[vertex].face().index()] as usize];
             *count = count.wrapping_add_signed(by);
@@ -208,9 +205,9 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// Whether there is a seam.
-    pub(super) fn has_seams(&self) -> bool {
-        self.seam.contains(&true)
+    /// The half-edges of all seams, on both sides, chart by chart.
+    pub(super) fn seams(&self) -> impl Iterator<Item = HalfEdgeId> {
+        self.boundaries.iter().flatten().copied().filter(|h| self.is_seam(*h))
     }
 
     /// The number of charts.
@@ -227,9 +224,7 @@ impl<'a> Network<'a> {
     pub(super) fn curves(&self) -> Vec<Vec<HalfEdgeId>> {
         let mut seen = vec![false; self.dual.mesh.edges().len()];
         let edge = |h: HalfEdgeId| self.dual.mesh.edges().edge(h).index();
-        let starts: Vec<HalfEdgeId> = self.dual.half_edges().filter(|h| self.is_seam(*h)).collect();
-        let (at_corners, elsewhere): (Vec<_>, Vec<_>) =
-            starts.into_iter().partition(|h| self.is_corner(self.dual.from(*h)));
+        let (at_corners, elsewhere): (Vec<_>, Vec<_>) = self.seams().partition(|h| self.is_corner(self.dual.from(*h)));
         let mut curves = Vec::new();
         for h in at_corners.into_iter().chain(elsewhere) {
             if !seen[edge(h)] {
@@ -241,135 +236,8 @@ impl<'a> Network<'a> {
         curves
     }
 
-    /// Takes the seam along a path away, so that another one can be laid.
-    pub(super) fn lift(&mut self, path: &[HalfEdgeId]) {
-        path.iter().for_each(|h| self.set_seam(*h, false));
-    }
-
-    /// Puts a lifted seam back.
-    pub(super) fn put_back(&mut self, path: &[HalfEdgeId]) {
-        path.iter().for_each(|h| self.set_seam(*h, true));
-    }
-
-    /// Lays seams in the place of `lifted` ones: the triangles up to the other seams change their labels. Undone, with
-    /// the lifted seams put back (and `false`), where one of the charts `labels` would be illegal or too large, or
-    /// smaller than half of what it was at first.
-    pub(super) fn lay(&mut self, lifted: &[HalfEdgeId], paths: &[Path], labels: &[u32]) -> bool {
-        self.marks.now += 1;
-        let added: Vec<HalfEdgeId> = paths.iter().flat_map(|p| p.half_edges.iter().copied()).collect();
-        self.put_back(&added);
-        let mut changed = Vec::new();
-        let fits = self.flood(paths, labels, &mut changed)
-            && labels.iter().all(|l| self.areas[*l as usize] >= self.least[*l as usize])
-            && {
-                self.renew_boundaries(labels, &added, &changed);
-                labels.iter().all(|l| self.is_legal(*l))
-            };
-        if !fits {
-            for (face, label) in changed.iter().rev() {
-                self.relabel(*face, *label);
-            }
-            self.lift(&added);
-            self.put_back(lifted);
-            self.renew_boundaries(labels, lifted, &changed);
-        }
-        fits
-    }
-
-    fn relabel(&mut self, face: FaceId, label: u32) -> u32 {
-        let vertices = self.dual.mesh.triangles()[face.index()].map(|v| v.index());
-        let owned = vertices.into_iter().filter(|v| self.out[*v].face() == face).collect::<Vec<_>>();
-        owned.iter().for_each(|v| self.count_inside(*v, -1));
-        let old = std::mem::replace(&mut self.labels[face.index()], label);
-        owned.iter().for_each(|v| self.count_inside(*v, 1));
-        self.sizes[old as usize] -= 1;
-        self.sizes[label as usize] += 1;
-        self.areas[old as usize] -= self.dual.area(face.index());
-        self.areas[label as usize] += self.dual.area(face.index());
-        old
-    }
-
-    /// Gives the triangles beside `new` the labels that they shall have, and from there all others up to the seams.
-    /// Whether no triangle was claimed by two labels. Ends because a triangle is claimed once.
-    fn flood(&mut self, new: &[Path], labels: &[u32], changed: &mut Vec<(FaceId, u32)>) -> bool {
-        let mut stack: Vec<FaceId> = Vec::new();
-        for path in new {
-            for h in &path.half_edges {
-                let beyond = self.dual.across(*h).map(|t| (t.face(), path.right));
-                for (face, label) in [Some((h.face(), path.left)), beyond].into_iter().flatten() {
-                    if !self.claim(face, label, labels, changed, &mut stack) {
-                        return false;
-                    }
-                }
-            }
-        }
-        while let Some(face) = stack.pop() {
-            let label = self.labels[face.index()];
-            for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
-                let Some(t) = self.dual.across(h) else { continue };
-                if self.is_seam(h) == (self.label(t) != label) {
-                    continue;
-                }
-                if self.is_seam(h) {
-                    // The chart would reach both sides of another seam.
-                    return false;
-                }
-                if !self.claim(t.face(), label, labels, changed, &mut stack) {
-                    return false;
-                }
-            }
-        }
-        true
-    }
-
-    /// Gives a triangle a label; fails where it has been given another one, or belongs to a chart that is not among
-    /// `labels`.
-    fn claim(
-        &mut self,
-        face: FaceId,
-        label: u32,
-        labels: &[u32],
-        changed: &mut Vec<(FaceId, u32)>,
-        stack: &mut Vec<FaceId>,
-    ) -> bool {
-        let had = self.labels[face.index()];
-        let claimed = std::mem::replace(&mut self.marks.faces[face.index()], self.marks.now) == self.marks.now;
-        if had != label {
-            if claimed || !labels.contains(&had) {
-                return false;
-            }
-            changed.push((face, self.relabel(face, label)));
-            stack.push(face);
-        }
-        true
-    }
-
-    /// Whether the triangles of a label form a chart within the limits, judged by its boundary as in
-    /// [`super::regions`]. (A label that falls apart and gets a handle at once would pass: see [`Self::is_sound`].)
-    fn is_legal(&mut self, label: u32) -> bool {
-        let boundary = std::mem::take(&mut self.boundaries[label as usize]);
-        let shape = self.shape(label, &boundary);
-        self.boundaries[label as usize] = boundary;
-        self.limits.allow(&shape)
-    }
-
-    /// Brings the boundaries of charts up to date: what is none any more goes, what was laid comes.
-    fn renew_boundaries(&mut self, labels: &[u32], laid: &[HalfEdgeId], changed: &[(FaceId, u32)]) {
-        for label in labels {
-            let mut boundary = std::mem::take(&mut self.boundaries[*label as usize]);
-            boundary.retain(|h| self.bounds(*h, *label));
-            let around = |(face, _): &(FaceId, u32)| [0, 1, 2].map(|k| HalfEdgeId::side_of(*face, k));
-            let near = laid.iter().copied().chain(changed.iter().flat_map(around));
-            let sides = near.flat_map(|h| [Some(h), self.dual.across(h)]).flatten();
-            boundary.extend(sides.filter(|h| self.bounds(*h, *label)));
-            boundary.sort_unstable();
-            boundary.dedup();
-            self.boundaries[*label as usize] = boundary;
-        }
-    }
-
     /// Whether `h` bounds the chart `label`.
-    fn bounds(&self, h: HalfEdgeId, label: u32) -> bool {
+    pub(super) fn bounds(&self, h: HalfEdgeId, label: u32) -> bool {
         self.label(h) == label && self.dual.across(h).is_none_or(|t| self.label(t) != label)
     }
 
@@ -382,40 +250,6 @@ impl<'a> Network<'a> {
             }
         }
         sets.labels().1 == self.charts()
-    }
-
-    /// Walks along the boundary of a label. With I inner vertices, B boundary half-edges and F triangles the Euler
-    /// number (of the label opened where it only touches itself) is I + (B - F)/2.
-    fn shape(&mut self, label: u32, boundary: &[HalfEdgeId]) -> Shape {
-        self.marks.now += 1;
-        let now = self.marks.now;
-        let (faces, inside) = (self.sizes[label as usize], self.inside[label as usize]);
-        let euler = inside as i64 + (boundary.len() as i64 - faces as i64) / 2;
-        let mut shape = Shape { faces, euler, loops: 0, seam_loops: 0, pinches: 0, meets_itself: false };
-        for start in boundary {
-            let mut h = *start;
-            let (mut fresh, mut seam) = (false, false);
-            while std::mem::replace(&mut self.marks.half_edges[h.index()], now) != now {
-                (fresh, seam) = (true, seam || self.dual.across(h).is_some());
-                let again = std::mem::replace(&mut self.marks.vertices[self.dual.from(h)], now) == now;
-                shape.pinches += usize::from(again);
-                let beyond = self.dual.mesh.edges().twin(h).filter(|_| self.dual.across(h).is_none());
-                shape.meets_itself |= beyond.is_some_and(|t| self.label(t) == label);
-                h = self.next(h, label);
-            }
-            shape.loops += usize::from(fresh);
-            shape.seam_loops += usize::from(seam);
-        }
-        shape
-    }
-
-    /// The half-edge after `h` along the boundary of a label.
-    fn next(&self, h: HalfEdgeId, label: u32) -> HalfEdgeId {
-        let mut e = h.next();
-        while let Some(t) = self.dual.across(e).filter(|t| self.label(*t) == label) {
-            e = t.next();
-        }
-        e
     }
 }
 

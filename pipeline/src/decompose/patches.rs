@@ -126,3 +126,57 @@ fn component<G: Graph>(graph: &G, start: usize, seen: &mut [bool]) -> Vec<u32> {
     }
     nodes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decompose::dual::Dual;
+    use crate::decompose::voronoi::farthest_first;
+    use crate::mesh::TriangleSoup;
+    use crate::repair::{Settings, repair};
+    use crate::shapes;
+
+    fn check(soup: &TriangleSoup, wanted: usize) {
+        let mesh = repair(soup, &Settings::default()).expect("a surface is left").mesh;
+        let dual = Dual::new(&mesh);
+        for cells in [compact_cells(&dual, |_| wanted), farthest_first(&dual, |_| wanted)] {
+            let mut seen = vec![false; dual.len()];
+            let mut found = vec![false; cells.count];
+            for start in 0..dual.len() {
+                if !seen[start] {
+                    let cell = cells.of[start] as usize;
+                    assert!(!std::mem::replace(&mut found[cell], true), "cell {cell} is connected");
+                    let mut stack = vec![start];
+                    while let Some(node) = stack.pop() {
+                        seen[node] = true;
+                        let own = |other: &usize| cells.of[*other] == cells.of[node];
+                        dual.each_neighbour(node, |n, _| stack.extend(Some(n).filter(|n| own(n) && !seen[*n])));
+                    }
+                }
+            }
+            assert!(found.iter().all(|f| *f), "no cell is empty");
+            assert_eq!(cells.count, mesh.census().components * wanted);
+        }
+    }
+
+    #[test]
+    fn cells_are_connected_and_cover() {
+        for wanted in [1, 2, 5, 33] {
+            check(&shapes::sphere(20), wanted);
+            check(&shapes::disk_with_holes(33, 5), wanted);
+            check(&shapes::ring_torus(30, 20), wanted);
+            check(&shapes::sliver_strip(40), wanted);
+        }
+        check(&shapes::bow_tie(), 1);
+    }
+
+    #[test]
+    fn cells_of_one_size_on_an_even_plate() {
+        let mesh = repair(&shapes::flat_disk(60), &Settings::default()).expect("a surface is left").mesh;
+        let cells = compact_cells(&Dual::new(&mesh), |_| 50);
+        let mut sizes = vec![0; cells.count];
+        cells.of.iter().for_each(|c| sizes[*c as usize] += 1);
+        let mean = mesh.triangles().len() / 50;
+        assert!(sizes.iter().all(|s| (mean / 4..3 * mean).contains(s)), "{mean}: {sizes:?}");
+    }
+}

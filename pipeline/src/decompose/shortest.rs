@@ -113,7 +113,7 @@ impl Tree {
         while let Some(At { distance: sum, node }) = self.heap.pop() {
             let node = node as usize;
             let so_far = self.known[node].distance;
-            if sum > so_far + ahead(self, node) && node != from {
+            if sum > so_far + ahead(self, node) {
                 continue;
             }
             self.settled.push(node);
@@ -216,5 +216,70 @@ impl Bounds<'_> {
         (free || may_end(to) && !network.is_seam(h))
             && !self.barred[network.dual.mesh.edges().edge(h).index()]
             && (!at_root || inside(h) && network.dual.across(h).is_some_and(inside))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decompose::merge::Limits;
+    use crate::repair::{Settings, repair};
+    use crate::shapes::{self, Random};
+
+    #[test]
+    fn three_points_are_joined_from_their_fermat_point() {
+        assert!((joined([1.0; 3]) - 3.0_f64.sqrt()).abs() < 1e-15);
+        assert_eq!(joined([1.9, 1.0, 1.0]), 2.0);
+        assert_eq!(joined([0.0, 3.0, 3.0]), 3.0);
+        let right = joined([1.0, 2.0_f64.sqrt(), 1.0]);
+        assert!((right - (2.0 + 3.0_f64.sqrt()).sqrt()).abs() < 1e-15);
+    }
+
+    /// The least sum of the ways from three vertices, whose trees are bounded by `length`.
+    fn meeting(network: &Network, ends: [usize; 3], length: f64) -> f64 {
+        let band = vec![true; network.dual.mesh.points().len()];
+        let [mut first, mut second, mut third] = [0; 3].map(|_| Tree::new(network.dual));
+        let bounds = |a, b| Bounds { goal: Goal::Meeting([a, b]), labels: &[0], length, band: &band };
+        first.grow(network, ends[0], &bounds((ends[1], None), (ends[2], None)));
+        second.grow(network, ends[1], &bounds((ends[0], Some(&first)), (ends[2], None)));
+        third.grow(network, ends[2], &bounds((ends[0], Some(&first)), (ends[1], Some(&second))));
+        let sum = |v: &usize| Some(first.distance(*v)? + second.distance(*v)? + third.distance(*v)?);
+        let inner = third.settled.iter().filter(|v| !ends.contains(v));
+        inner.filter_map(sum).fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn bounds_do_not_hide_the_shortest_ways() {
+        let mesh = repair(&shapes::bent_disk(16, 0.3, 0.2), &Settings::default()).expect("a surface is left").mesh;
+        let dual = Dual::new(&mesh);
+        let limits = Limits { area_ratio: 1e6, triangles: usize::MAX, strict_disks: false };
+        let network = Network::new(&dual, vec![0; mesh.triangles().len()], limits);
+        let inner: Vec<usize> = (0..mesh.points().len()).filter(|v| !network.is_open(*v)).collect();
+        let mut random = Random(3);
+        for _ in 0..40 {
+            let ends = [0; 3].map(|_| inner[random.below(inner.len())]);
+            let free = meeting(&network, ends, 1e9);
+            let bounded = meeting(&network, ends, 1.000001 * free);
+            assert!((free - bounded).abs() < 1e-12, "{free} {bounded}");
+        }
+    }
+
+    #[test]
+    fn a_star_finds_what_dijkstra_finds() {
+        let mesh = repair(&shapes::bent_disk(16, 0.3, 0.2), &Settings::default()).expect("a surface is left").mesh;
+        let dual = Dual::new(&mesh);
+        let limits = Limits { area_ratio: 1e6, triangles: usize::MAX, strict_disks: false };
+        let network = Network::new(&dual, vec![0; mesh.triangles().len()], limits);
+        let band = vec![true; mesh.points().len()];
+        let (mut all, mut one) = (Tree::new(&dual), Tree::new(&dual));
+        let bounds = |goal| Bounds { goal, labels: &[0], length: f64::INFINITY, band: &band };
+        let inner: Vec<usize> = (0..mesh.points().len()).filter(|v| !network.is_open(*v)).collect();
+        all.grow(&network, inner[0], &bounds(Goal::Meeting([(inner[0], None); 2])));
+        for target in inner.iter().skip(1).step_by(7) {
+            one.grow(&network, inner[0], &bounds(Goal::Vertex(*target)));
+            let path = one.path(&dual, *target);
+            assert!((length(&dual, &path) - one.distance(*target).expect("reached")).abs() < 1e-12);
+            assert!((one.distance(*target).expect("reached") - all.distance(*target).expect("reached")).abs() < 1e-12);
+        }
     }
 }

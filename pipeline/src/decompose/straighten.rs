@@ -6,7 +6,8 @@
 //! falls with every change, and the number of rounds is fixed.
 
 use super::dual::Dual;
-use super::network::{Network, Path};
+use super::lay::Path;
+use super::network::Network;
 use super::shortest::{Bounds, Goal, Tree, length, reversed, weight};
 use super::voronoi::At;
 use crate::id::HalfEdgeId;
@@ -14,7 +15,7 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 /// Rounds over all seams and corners, and the share of the length that makes another one worth while.
 const ROUNDS: usize = 2;
-const LEAST_GAIN: f64 = 1e-3;
+const LEAST_GAIN: f64 = 5e-3;
 
 /// Pieces of fewer edges are not looked at.
 const FEW: usize = 4;
@@ -41,8 +42,8 @@ struct Straightening<'n, 'a> {
 }
 
 /// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges, nor along a
-/// `barred` edge.
-pub(super) fn straighten(network: &mut Network, barred: &[bool], breadth: impl Fn(HalfEdgeId) -> f64) {
+/// `barred` edge. Whether they became so much shorter that it is worth while to do it again.
+pub(super) fn straighten(network: &mut Network, barred: &[bool], breadth: impl Fn(HalfEdgeId) -> f64) -> bool {
     let dual = network.dual;
     let tree = || Tree::new(dual);
     let area: f64 = (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum();
@@ -50,20 +51,22 @@ pub(super) fn straighten(network: &mut Network, barred: &[bool], breadth: impl F
     let band = band(network, breadth);
     let trees = [tree(), tree(), tree()];
     let mut work = Straightening { network, dual, trees, reach, band, barred, vain: BTreeSet::new() };
-    for _ in 0..ROUNDS {
-        let before = work.total();
+    let mut lengths = vec![work.total()];
+    let is_worth = |after: f64, before: f64| after < (1.0 - LEAST_GAIN) * before;
+    for round in 0..ROUNDS {
         work.seams();
         work.corners();
-        if work.total() > (1.0 - LEAST_GAIN) * before {
-            return;
+        lengths.push(work.total());
+        if !is_worth(lengths[round + 1], lengths[round]) {
+            break;
         }
     }
+    is_worth(lengths[lengths.len() - 1], lengths[0])
 }
 
 impl Straightening<'_, '_> {
     fn total(&self) -> f64 {
-        let seams = self.dual.half_edges().filter(|h| self.network.is_seam(*h));
-        0.5 * seams.map(|h| weight(self.dual, h)).sum::<f64>()
+        0.5 * self.network.seams().map(|h| weight(self.dual, h)).sum::<f64>()
     }
 
     /// One pass over all seams.
@@ -248,7 +251,7 @@ fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Vec<bool> {
     let dual = network.dual;
     let mut left = vec![0.0_f64; dual.mesh.points().len()];
     let mut heap = BinaryHeap::new();
-    for h in dual.half_edges().filter(|h| network.is_seam(*h)) {
+    for h in network.seams() {
         let breadth = breadth(h);
         if breadth > left[dual.from(h)] {
             left[dual.from(h)] = breadth;

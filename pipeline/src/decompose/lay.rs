@@ -1,0 +1,249 @@
+//! Moving seams: some of their edges are replaced by other paths, and the triangles between the old and the new ones
+//! change their labels. The operation is undone where a chart would not be legal any more.
+
+use super::network::Network;
+use super::regions::Shape;
+use crate::id::{FaceId, HalfEdgeId};
+
+/// A path along edges: half-edges from end to end, with the label that shall lie on its left and on its right.
+#[derive(Clone, Debug)]
+pub(super) struct Path {
+    pub half_edges: Vec<HalfEdgeId>,
+    pub left: u32,
+    pub right: u32,
+}
+
+impl Network<'_> {
+    /// Takes the seam along a path away, so that another one can be laid.
+    pub(super) fn lift(&mut self, path: &[HalfEdgeId]) {
+        path.iter().for_each(|h| self.set_seam(*h, false));
+    }
+
+    /// Puts a lifted seam back.
+    pub(super) fn put_back(&mut self, path: &[HalfEdgeId]) {
+        path.iter().for_each(|h| self.set_seam(*h, true));
+    }
+
+    /// Lays seams in the place of `lifted` ones: the triangles up to the other seams change their labels. Undone, with
+    /// the lifted seams put back (and `false`), where one of the charts `labels` would be illegal or too large, or
+    /// smaller than half of what it was at first.
+    pub(super) fn lay(&mut self, lifted: &[HalfEdgeId], paths: &[Path], labels: &[u32]) -> bool {
+        self.marks.now += 1;
+        let added: Vec<HalfEdgeId> = paths.iter().flat_map(|p| p.half_edges.iter().copied()).collect();
+        self.put_back(&added);
+        let mut changed = Vec::new();
+        let fits = self.flood(paths, labels, &mut changed)
+            && labels.iter().all(|l| self.areas[*l as usize] >= self.least[*l as usize])
+            && {
+                self.renew_boundaries(labels, &added, &changed);
+                labels.iter().all(|l| self.is_legal(*l))
+            };
+        if !fits {
+            for (face, label) in changed.iter().rev() {
+                self.relabel(*face, *label);
+            }
+            self.lift(&added);
+            self.put_back(lifted);
+            self.renew_boundaries(labels, lifted, &changed);
+        }
+        fits
+    }
+
+    fn relabel(&mut self, face: FaceId, label: u32) -> u32 {
+        let vertices = self.dual.mesh.triangles()[face.index()].map(|v| v.index());
+        let owned = vertices.into_iter().filter(|v| self.out[*v].face() == face).collect::<Vec<_>>();
+        owned.iter().for_each(|v| self.count_inside(*v, -1));
+        let old = std::mem::replace(&mut self.labels[face.index()], label);
+        owned.iter().for_each(|v| self.count_inside(*v, 1));
+        self.sizes[old as usize] -= 1;
+        self.sizes[label as usize] += 1;
+        self.areas[old as usize] -= self.dual.area(face.index());
+        self.areas[label as usize] += self.dual.area(face.index());
+        old
+    }
+
+    /// Gives the triangles beside `new` the labels that they shall have, and from there all others up to the seams.
+    /// Whether no triangle was claimed by two labels. Ends because a triangle is claimed once.
+    fn flood(&mut self, new: &[Path], labels: &[u32], changed: &mut Vec<(FaceId, u32)>) -> bool {
+        let mut stack: Vec<FaceId> = Vec::new();
+        for path in new {
+            for h in &path.half_edges {
+                let beyond = self.dual.across(*h).map(|t| (t.face(), path.right));
+                for (face, label) in [Some((h.face(), path.left)), beyond].into_iter().flatten() {
+                    if !self.claim(face, label, labels, changed, &mut stack) {
+                        return false;
+                    }
+                }
+            }
+        }
+        while let Some(face) = stack.pop() {
+            let label = self.labels[face.index()];
+            for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
+                let Some(t) = self.dual.across(h) else { continue };
+                if self.is_seam(h) == (self.label(t) != label) {
+                    continue;
+                }
+                if self.is_seam(h) {
+                    // The chart would reach both sides of another seam.
+                    return false;
+                }
+                if !self.claim(t.face(), label, labels, changed, &mut stack) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Gives a triangle a label; fails where it has been given another one, or belongs to a chart that is not among
+    /// `labels`.
+    fn claim(
+        &mut self,
+        face: FaceId,
+        label: u32,
+        labels: &[u32],
+        changed: &mut Vec<(FaceId, u32)>,
+        stack: &mut Vec<FaceId>,
+    ) -> bool {
+        let had = self.labels[face.index()];
+        let claimed = std::mem::replace(&mut self.marks.faces[face.index()], self.marks.now) == self.marks.now;
+        if had != label {
+            if claimed || !labels.contains(&had) {
+                return false;
+            }
+            changed.push((face, self.relabel(face, label)));
+            stack.push(face);
+        }
+        true
+    }
+
+    /// Whether the triangles of a label form a chart within the limits, judged by its boundary as in
+    /// [`super::regions`]. (A label that falls apart and gets a handle at once would pass: see [`Self::is_sound`].)
+    fn is_legal(&mut self, label: u32) -> bool {
+        let boundary = std::mem::take(&mut self.boundaries[label as usize]);
+        let shape = self.shape(label, &boundary);
+        self.boundaries[label as usize] = boundary;
+        self.limits.allow(&shape)
+    }
+
+    /// Brings the boundaries of charts up to date: what is none any more goes, what was laid comes.
+    fn renew_boundaries(&mut self, labels: &[u32], laid: &[HalfEdgeId], changed: &[(FaceId, u32)]) {
+        for label in labels {
+            let mut boundary = std::mem::take(&mut self.boundaries[*label as usize]);
+            boundary.retain(|h| self.bounds(*h, *label));
+            let around = |(face, _): &(FaceId, u32)| [0, 1, 2].map(|k| HalfEdgeId::side_of(*face, k));
+            let near = laid.iter().copied().chain(changed.iter().flat_map(around));
+            let sides = near.flat_map(|h| [Some(h), self.dual.across(h)]).flatten();
+            boundary.extend(sides.filter(|h| self.bounds(*h, *label)));
+            boundary.sort_unstable();
+            boundary.dedup();
+            self.boundaries[*label as usize] = boundary;
+        }
+    }
+
+    /// Walks along the boundary of a label. With I inner vertices, B boundary half-edges and F triangles the Euler
+    /// number (of the label opened where it only touches itself) is I + (B - F)/2.
+    fn shape(&mut self, label: u32, boundary: &[HalfEdgeId]) -> Shape {
+        self.marks.now += 1;
+        let now = self.marks.now;
+        let (faces, inside) = (self.sizes[label as usize], self.inside[label as usize]);
+        let euler = inside as i64 + (boundary.len() as i64 - faces as i64) / 2;
+        let mut shape = Shape { faces, euler, loops: 0, seam_loops: 0, pinches: 0, meets_itself: false };
+        for start in boundary {
+            let mut h = *start;
+            let (mut fresh, mut seam) = (false, false);
+            while std::mem::replace(&mut self.marks.half_edges[h.index()], now) != now {
+                (fresh, seam) = (true, seam || self.dual.across(h).is_some());
+                let again = std::mem::replace(&mut self.marks.vertices[self.dual.from(h)], now) == now;
+                shape.pinches += usize::from(again);
+                let beyond = self.dual.mesh.edges().twin(h).filter(|_| self.dual.across(h).is_none());
+                shape.meets_itself |= beyond.is_some_and(|t| self.label(t) == label);
+                h = self.next(h, label);
+            }
+            shape.loops += usize::from(fresh);
+            shape.seam_loops += usize::from(seam);
+        }
+        shape
+    }
+
+    /// The half-edge after `h` along the boundary of a label.
+    fn next(&self, h: HalfEdgeId, label: u32) -> HalfEdgeId {
+        let mut e = h.next();
+        while let Some(t) = self.dual.across(e).filter(|t| self.label(*t) == label) {
+            e = t.next();
+        }
+        e
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decompose::dual::Dual;
+    use crate::decompose::merge::Limits;
+    use crate::decompose::patches::compact_cells;
+    use crate::decompose::shortest::{Bounds, Goal, Tree};
+    use crate::repair::{Settings, repair};
+    use crate::shapes::{self, Random};
+
+    /// Compares a network with one that is made anew of its labels.
+    fn compare(network: &Network) {
+        let anew = Network::new(network.dual, network.labels.clone(), network.limits);
+        assert_eq!((&network.sizes, &network.inside), (&anew.sizes, &anew.inside));
+        assert_eq!(network.boundaries, anew.boundaries);
+        assert!(network.areas.iter().zip(&anew.areas).all(|(a, b)| (a - b).abs() < 1e-9));
+        assert!(network.dual.half_edges().all(|h| network.is_seam(h) == anew.is_seam(h)));
+        assert!((0..network.dual.mesh.points().len()).all(|v| network.degree(v) == anew.degree(v)));
+    }
+
+    /// Lays a seam, or a part of one, along a shortest path through vertices that are chosen at random.
+    fn lay_some(network: &mut Network, random: &mut Random) -> Option<bool> {
+        let curves = network.curves();
+        let curve = &curves[random.below(curves.len())];
+        let from = random.below(curve.len());
+        let path = &curve[from..from + 1 + random.below(curve.len() - from)];
+        let (first, last) = (path[0], path[path.len() - 1]);
+        let (left, right) = (network.label(first), network.label(network.dual.across(first)?));
+        let (root, target) = (network.dual.from(first), network.dual.to(last));
+        let band: Vec<bool> = (0..network.dual.mesh.points().len()).map(|_| random.below(4) > 0).collect();
+        network.lift(path);
+        let labels = [left, right];
+        let bounds = Bounds { goal: Goal::Vertex(target), labels: &labels, length: f64::INFINITY, band: &band };
+        let mut tree = Tree::new(network.dual);
+        tree.grow(network, root, &bounds);
+        if root == target || tree.distance(target).is_none() {
+            network.put_back(path);
+            return None;
+        }
+        let half_edges = tree.path(network.dual, target);
+        Some(network.lay(path, &[Path { half_edges, left, right }], &labels))
+    }
+
+    #[test]
+    fn a_network_stays_what_its_labels_make_it() {
+        for (soup, charts) in
+            [(shapes::sphere(16), 6), (shapes::disk_with_holes(25, 3), 5), (shapes::ring_torus(24, 16), 9)]
+        {
+            let mesh = repair(&soup, &Settings::default()).expect("a surface is left").mesh;
+            let dual = Dual::new(&mesh);
+            let cells = compact_cells(&dual, |_| charts);
+            let largest = 11 * mesh.triangles().len() / charts / 10;
+            let limits = Limits { area_ratio: 1e6, triangles: largest, strict_disks: false };
+            let mut network = Network::new(&dual, cells.of, limits);
+            let mut random = Random(7);
+            let (mut laid, mut undone) = (0, 0);
+            for _ in 0..200 {
+                let before = network.labels.clone();
+                match lay_some(&mut network, &mut random) {
+                    Some(true) => laid += 1,
+                    other => {
+                        undone += usize::from(other.is_some());
+                        assert_eq!(network.labels, before);
+                    }
+                }
+                compare(&network);
+            }
+            assert!(laid > 10 && undone > 10, "{laid} laid, {undone} undone");
+        }
+    }
+}
