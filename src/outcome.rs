@@ -50,9 +50,9 @@ pub enum Code {
     OnlyDegenerate,
     /// More elements than planish can number.
     TooLarge,
-    /// The surface is not one disk, with or without holes.
+    /// The surface is not one disk: given by earlier versions only, and read in their reports.
     NeedsDecomposition,
-    /// A chart is too distorted for one map.
+    /// A single triangle cannot be mapped.
     NeedsSplit,
     /// A fault of planish.
     Internal,

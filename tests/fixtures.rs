@@ -17,7 +17,7 @@ pub const ALL: [(&str, usize, usize, Option<u64>, std::ops::RangeInclusive<usize
     ("folding_six.obj", 1, 1, Some(0), 1..=1),
     ("sliver_strip.obj", 1, 1, Some(0), 1..=1),
     ("cracked_patch.obj", 1, 1, Some(0), 1..=1),
-    ("finger.obj", 1, 1, Some(0), 1..=1),
+    ("finger.obj", 1, 1, Some(0), 1..=2),
     ("bow_tie.stl", 2, 2, Some(0), 2..=2),
     ("moebius.obj", 1, 1, None, 2..=2),
     ("sphere.stl", 1, 0, Some(0), 2..=2),

@@ -20,8 +20,7 @@
 //!
 //! # What is not
 //!
-//! Surfaces that are not one disk (with or without holes) are refused by [`decompose()`]. The map is a local
-//! minimiser of the energy, within the maps whose jacobians have positive Bernstein coefficients.
+//! The map is a local minimiser of the energy, within the maps whose jacobians have positive Bernstein coefficients.
 //!
 //! The method is that of *Surface reparametrization using quadratic finite elements* (Beaufort and co-workers),
 //! with an optimiser and a certificate of its own.

@@ -302,7 +302,7 @@ mod tests {
         check(sliver_strip(12), 1, 1, Some(0), true);
         check(cracked_patch(), 1, 1, Some(0), true);
         check(sphere(6), 1, 0, Some(0), true);
-        check(torus(7, 5), 1, 0, Some(1), true);
+        check(ring_torus(7, 5), 1, 0, Some(1), true);
         check(finger(12, 2), 1, 1, Some(0), true);
         check(ring_torus(9, 6), 1, 0, Some(1), true);
         check(book(3, 4), 3, 3, Some(0), true);

@@ -101,7 +101,7 @@ impl Work {
         let middle = VertexId::at(self.mesh.points.len());
         let parts = [h, t].map(|side| self.halves(side, middle));
         let size = self.sizes[self.labels[h.face().index()] as usize] + 2;
-        if size > self.max_triangles || parts.iter().flatten().any(|(_, shape)| !(shape.area() > 0.0)) {
+        if size > self.max_triangles || parts.iter().flatten().any(|(_, shape)| shape.area() == 0.0) {
             return false;
         }
         self.sizes[self.labels[h.face().index()] as usize] = size;

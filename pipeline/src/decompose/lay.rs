@@ -208,7 +208,9 @@ mod tests {
         let band: Vec<bool> = (0..network.dual.mesh.points().len()).map(|_| random.below(4) > 0).collect();
         network.lift(path);
         let labels = [left, right];
-        let bounds = Bounds { goal: Goal::Vertex(target), labels: &labels, length: f64::INFINITY, band: &band };
+        let barred = vec![false; network.dual.mesh.edges().len()];
+        let bounds =
+            Bounds { goal: Goal::Vertex(target), labels: &labels, length: f64::INFINITY, band: &band, barred: &barred };
         let mut tree = Tree::new(network.dual);
         tree.grow(network, root, &bounds);
         if root == target || tree.distance(target).is_none() {

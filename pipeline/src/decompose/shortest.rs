@@ -239,7 +239,8 @@ mod tests {
     fn meeting(network: &Network, ends: [usize; 3], length: f64) -> f64 {
         let band = vec![true; network.dual.mesh.points().len()];
         let [mut first, mut second, mut third] = [0; 3].map(|_| Tree::new(network.dual));
-        let bounds = |a, b| Bounds { goal: Goal::Meeting([a, b]), labels: &[0], length, band: &band };
+        let barred = vec![false; network.dual.mesh.edges().len()];
+        let bounds = |a, b| Bounds { goal: Goal::Meeting([a, b]), labels: &[0], length, band: &band, barred: &barred };
         first.grow(network, ends[0], &bounds((ends[1], None), (ends[2], None)));
         second.grow(network, ends[1], &bounds((ends[0], Some(&first)), (ends[2], None)));
         third.grow(network, ends[2], &bounds((ends[0], Some(&first)), (ends[1], Some(&second))));
@@ -272,7 +273,8 @@ mod tests {
         let network = Network::new(&dual, vec![0; mesh.triangles().len()], limits);
         let band = vec![true; mesh.points().len()];
         let (mut all, mut one) = (Tree::new(&dual), Tree::new(&dual));
-        let bounds = |goal| Bounds { goal, labels: &[0], length: f64::INFINITY, band: &band };
+        let barred = vec![false; dual.mesh.edges().len()];
+        let bounds = |goal| Bounds { goal, labels: &[0], length: f64::INFINITY, band: &band, barred: &barred };
         let inner: Vec<usize> = (0..mesh.points().len()).filter(|v| !network.is_open(*v)).collect();
         all.grow(&network, inner[0], &bounds(Goal::Meeting([(inner[0], None); 2])));
         for target in inner.iter().skip(1).step_by(7) {
