@@ -7,8 +7,11 @@ use planish::outcome::Status;
 #[path = "../fixtures/generate.rs"]
 pub mod generate;
 
-/// Per fixture: name, components, loops, genus, charts without features.
-pub const ALL: [(&str, usize, usize, Option<u64>, std::ops::RangeInclusive<usize>); 13] = [
+/// A fixture: name, components, loops, genus, charts without features.
+type Fixture = (&'static str, usize, usize, Option<u64>, std::ops::RangeInclusive<usize>);
+
+/// All fixtures.
+pub const ALL: [Fixture; 13] = [
     ("disk.stl", 1, 1, Some(0), 1..=1),
     ("disk_with_holes.stl", 1, 4, Some(0), 1..=1),
     ("bent_disk.stl", 1, 1, Some(0), 1..=1),
