@@ -14,7 +14,7 @@ use crate::id::HalfEdgeId;
 
 /// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
 /// seams along a tube come together. So the area ratio is foretold again after every step, and the last good one kept.
-const BANDS: [f64; 3] = [0.5, 1.0, 2.0];
+const BANDS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// How far seams may be straightened, as a share of the narrowest gap beside them.
 const SHARE: f64 = 0.3;
