@@ -101,21 +101,17 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64) -> Result<Ma
     let start = linear.raised(&closed, &boundary);
     let centres = (0..closed.loops().len()).map(|k| start[closed.centre_node(k)]).collect();
     let certified_start = prove(planar(&closed, &start, centres)).map_err(MapError::Start)?;
-    if max_area_ratio.is_finite() {
-        let ratio = distortion::area_ratio(chart, &certified_start);
-        if ratio > max_area_ratio {
-            return Err(MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) });
-        }
-    }
+    let within = |ratio: &dyn Fn() -> f64| {
+        let ratio = if max_area_ratio.is_finite() { ratio() } else { 1.0 };
+        let stretched = || MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) };
+        if ratio > max_area_ratio { Err(stretched()) } else { Ok(()) }
+    };
+    within(&|| distortion::area_ratio(chart, &certified_start))?;
     let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary));
     if let Some(Ok(map)) = &harmonic
-        && max_area_ratio.is_finite()
         && map.invalid().len() <= chart.triangles().len() / FEW_INVALID
     {
-        let ratio = distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n]));
-        if ratio > max_area_ratio {
-            return Err(MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) });
-        }
+        within(&|| distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n])))?;
     }
     Ok(MappedChart { closed, linear, start, certified_start, harmonic })
 }

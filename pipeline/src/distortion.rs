@@ -155,7 +155,7 @@ fn plane_areas(map: &CertifiedMap) -> Vec<f64> {
 }
 
 /// The values at the given shares of the total weight.
-fn quantiles<const N: usize>(weighted: &mut [(f64, f64)], shares: [f64; N]) -> [f64; N] {
+pub(crate) fn quantiles<const N: usize>(weighted: &mut [(f64, f64)], shares: [f64; N]) -> [f64; N] {
     weighted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let total: f64 = weighted.iter().map(|w| w.1).sum();
     shares.map(|share| {

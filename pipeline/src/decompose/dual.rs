@@ -91,6 +91,11 @@ impl<'a> Dual<'a> {
         self.centroids[face]
     }
 
+    /// The mollified area of all triangles.
+    pub(super) fn total_area(&self) -> f64 {
+        self.areas.iter().sum()
+    }
+
     /// The mollified area.
     pub(super) fn area(&self, face: usize) -> f64 {
         self.areas[face]

@@ -6,8 +6,10 @@
 //! within a few triangles are the same side. Chains that are short all told are dropped, and patches that are small
 //! all round are given to the neighbour with which they share most.
 
+use super::Settings;
 use super::dual::Dual;
 use crate::id::HalfEdgeId;
+use crate::mesh::SurfaceMesh;
 use crate::space::{Vec3, dot, norm};
 use crate::union_find::UnionFind;
 
@@ -23,8 +25,15 @@ const LEAST_LENGTH: f64 = 0.06;
 /// The least outline of a patch between features, likewise.
 const LEAST_OUTLINE: f64 = 0.12;
 
+/// The dual graph of a surface with its feature edges marked, and their number.
+pub(super) fn with_features<'a>(mesh: &'a SurfaceMesh, settings: &Settings) -> (Dual<'a>, usize) {
+    let mut dual = Dual::new(mesh);
+    let count = settings.feature_angle.map_or(0, |angle| mark_features(&mut dual, angle));
+    (dual, count)
+}
+
 /// Marks the feature edges of `dual`: dihedral angle above `angle` degrees. Returns their number.
-pub(super) fn mark_features(dual: &mut Dual, angle: f64) -> usize {
+fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     let cos = |degrees: f64| degrees.to_radians().cos();
     let (sharp, blunt) = (cos(angle), cos(LOWER * angle));
     let normals: Vec<Vec3> = (0..dual.mesh.triangles().len()).map(|f| dual.area_vector(f)).collect();
@@ -41,7 +50,7 @@ pub(super) fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     let strong: Vec<bool> = measured.iter().map(|(_, [m, n])| is_bent(*m, *n, sharp)).collect();
     let kept = long_enough(dual, &measured.iter().map(|m| m.0).collect::<Vec<_>>(), &strong);
     kept.iter().for_each(|h| dual.feature[dual.mesh.edges().edge(*h).index()] = true);
-    let least = LEAST_OUTLINE * total_area(dual).sqrt();
+    let least = LEAST_OUTLINE * dual.total_area().sqrt();
     // Every time some patches are united with others, so that fewer are left.
     while drop_small_patches(dual, &kept, least) {}
     dual.feature.iter().filter(|f| **f).count()
@@ -88,10 +97,6 @@ fn patches(dual: &Dual) -> (Vec<u32>, usize) {
     sets.labels()
 }
 
-fn total_area(dual: &Dual) -> f64 {
-    (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum()
-}
-
 /// Whether two normals (of any length) differ by more than the angle with this cosine.
 fn is_bent(m: Vec3, n: Vec3, cos: f64) -> bool {
     dot(m, n) < cos * norm(m) * norm(n)
@@ -125,6 +130,6 @@ fn long_enough(dual: &Dual, edges: &[HalfEdgeId], strong: &[bool]) -> Vec<HalfEd
     for (h, _) in edges.iter().zip(strong).filter(|(_, s)| **s) {
         lengths[sets.find(dual.from(*h))] += dual.length(*h);
     }
-    let least = LEAST_LENGTH * total_area(dual).sqrt();
+    let least = LEAST_LENGTH * dual.total_area().sqrt();
     edges.iter().copied().filter(|h| lengths[sets.find(dual.from(*h))] >= least).collect()
 }

@@ -41,9 +41,8 @@ pub(super) fn finish(
         // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
         for part in 0..PARTS {
             let part_of = best.parts(&bad);
-            let breadth =
-                |h: HalfEdgeId| if part_of(h).is_none_or(|p| p == part) { clear(h).min(band * size(h)) } else { 0.0 };
-            let _kept_or_left = best.step(cells, settings.max_area_ratio, &gaps, breadth);
+            let in_part = |h: HalfEdgeId| if part_of(h).is_none_or(|p| p == part) { breadth(h) } else { 0.0 };
+            let _kept_or_left = best.step(cells, settings.max_area_ratio, &gaps, in_part);
         }
     }
     let Judged { network, verdicts } = best;

@@ -1,8 +1,7 @@
 //! What a chart must be: connected, oriented, of genus 0, with simple boundary loops that share no vertex.
 
 use crate::id::{ChartId, EdgeId, HalfEdgeId, VertexId};
-use crate::mesh::EdgeTable;
-use crate::union_find::UnionFind;
+use crate::mesh::{EdgeTable, count_components};
 
 /// Why a set of triangles is no chart.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -58,7 +57,7 @@ pub fn verify(chart: ChartId, triangles: &[[VertexId; 3]], edges: &EdgeTable, ve
     if let Some((edge, _)) = edges.iter().find(|(_, sides)| !sound(sides)) {
         return Err(Illegal::Edge { chart, edge });
     }
-    let parts = parts(triangles.len(), edges);
+    let parts = count_components(triangles.len(), edges);
     if parts != 1 {
         return Err(Illegal::Apart { chart, parts });
     }
@@ -77,16 +76,6 @@ pub fn verify(chart: ChartId, triangles: &[[VertexId; 3]], edges: &EdgeTable, ve
         return Err(Illegal::Topology { chart, loops, euler });
     }
     Ok(())
-}
-
-fn parts(faces: usize, edges: &EdgeTable) -> usize {
-    let mut sets = UnionFind::new(faces);
-    for (_, sides) in edges.iter() {
-        if let [g, h] = *sides {
-            sets.unite(g.face().index(), h.face().index());
-        }
-    }
-    sets.labels().1
 }
 
 /// A vertex at which sheets touch that share no edge there: more umbrellas than the boundary half-edges out of it

@@ -45,7 +45,7 @@ pub use assemble::assemble;
 use complex::Complex;
 use dual::Dual;
 pub use ears::{WithoutEars, split_ears};
-use features::mark_features;
+use features::with_features;
 use finish::finish;
 pub use legality::Illegal;
 use merge::Limits;
@@ -89,9 +89,7 @@ impl Default for Settings {
 /// # Errors
 /// [`Error`].
 pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error> {
-    let mut dual = Dual::new(mesh);
-    let features = settings.feature_angle.map_or(0, |angle| mark_features(&mut dual, angle));
-    let dual = dual;
+    let (dual, features) = with_features(mesh, settings);
     let limits = Limits::new(settings);
     let (cells, complex) = cells(&dual, &limits);
     let graph = CellGraph::new(&complex);

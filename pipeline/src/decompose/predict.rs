@@ -8,6 +8,7 @@
 use super::complex::{Complex, NONE};
 use super::ldl::Springs;
 use super::voronoi::Graph;
+use crate::distortion::quantiles;
 use crate::space::{Vec3, distance};
 use std::f64::consts::TAU;
 
@@ -255,8 +256,7 @@ impl<'a> System<'a> {
             energy[*i as usize] += w * squared(place(*i), *p);
         }
         let mut densities: Vec<(f64, f64)> = (0..self.cells.len()).map(|i| self.density(i, &energy)).collect();
-        densities.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        let (low, high) = (quantile(&densities, QUANTILE), quantile(&densities, 1.0 - QUANTILE));
+        let [low, high] = quantiles(&mut densities, [QUANTILE, 1.0 - QUANTILE]);
         if low > 0.0 { (high / low).max(1.0) } else { f64::INFINITY }
     }
 
@@ -269,13 +269,3 @@ impl<'a> System<'a> {
 
 /// The share of the area that is left out at either end.
 const QUANTILE: f64 = 0.001;
-
-/// The first value that this share of the total weight does not exceed.
-fn quantile(sorted: &[(f64, f64)], share: f64) -> f64 {
-    let mut left = share * sorted.iter().map(|d| d.1).sum::<f64>();
-    let reached = sorted.iter().find(|d| {
-        left -= d.1;
-        left <= 0.0
-    });
-    reached.or(sorted.last()).map_or(1.0, |d| d.0)
-}

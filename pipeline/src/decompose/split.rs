@@ -6,7 +6,7 @@
 
 use super::complex::Complex;
 use super::dual::Dual;
-use super::features::mark_features;
+use super::features::with_features;
 use super::merge::Limits;
 use super::regions::Regions;
 use super::voronoi::{Cells, bisect_until, farthest_first};
@@ -37,16 +37,12 @@ pub fn split(
         return Ok(None);
     }
     let part = mesh.part(chart);
-    let mut dual = Dual::new(&part);
-    settings.feature_angle.iter().for_each(|angle| {
-        mark_features(&mut dual, *angle);
-    });
-    let dual = dual;
+    let (dual, _) = with_features(&part, settings);
     let limits = Limits::new(settings);
     let by_scale = log_scale.and_then(|s| across_protrusion(&dual, s, &limits));
     let labels = by_scale.unwrap_or_else(|| halves(&dual, &limits));
     let (cells, _) = cells(&dual, &limits);
-    let size = (0..part.triangles().len()).map(|f| dual.area(f)).sum::<f64>() / cells.count as f64;
+    let size = dual.total_area() / cells.count as f64;
     let pieces = finish(&dual, labels, limits, settings, &cells, |_| size.sqrt())?;
     let on_surface = |piece: &Chart| Chart {
         id: chart.id,

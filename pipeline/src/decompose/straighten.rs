@@ -46,8 +46,7 @@ struct Straightening<'n, 'a> {
 pub(super) fn straighten(network: &mut Network, barred: &[bool], breadth: impl Fn(HalfEdgeId) -> f64) -> bool {
     let dual = network.dual;
     let tree = || Tree::new(dual);
-    let area: f64 = (0..dual.mesh.triangles().len()).map(|f| dual.area(f)).sum();
-    let reach = REACH * (area / network.charts().max(1) as f64).sqrt();
+    let reach = REACH * (dual.total_area() / network.charts().max(1) as f64).sqrt();
     let band = band(network, breadth);
     let trees = [tree(), tree(), tree()];
     let mut work = Straightening { network, dual, trees, reach, band, barred, vain: BTreeSet::new() };

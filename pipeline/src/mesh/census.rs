@@ -165,7 +165,8 @@ fn count_vertices(umbrella_vertices: &[VertexId]) -> (usize, usize) {
     runs.fold((0, 0), |(all, several), run| (all + 1, several + usize::from(run.len() > 1)))
 }
 
-fn count_components(faces: usize, edges: &EdgeTable) -> usize {
+/// The number of parts connected through edges.
+pub(crate) fn count_components(faces: usize, edges: &EdgeTable) -> usize {
     let mut sets = UnionFind::new(faces);
     for (_, sides) in edges.iter() {
         for pair in sides.windows(2) {

@@ -7,8 +7,8 @@ mod soup;
 mod stars;
 mod surface;
 
-pub(crate) use census::orientation;
 pub use census::{Census, Umbrellas};
+pub(crate) use census::{count_components, orientation};
 pub use edges::EdgeTable;
 pub use intrinsic::{Metric, TriangleShape};
 pub use soup::{SoupError, TriangleSoup};
