@@ -90,7 +90,7 @@ fn few_charts_carry_each_shape_and_gmsh_remeshes_through_them() {
         ("cad_gmsh_t13.stl", 4),
         ("aneurysm_gmsh.stl", 4),
         ("bunny_stanford.stl", 4),
-        ("airplane_27_holes.obj", 8),
+        ("airplane_27_holes.obj", 12),
         ("punctured_torus.obj", 3),
     ];
     inputs.extend(scans.map(|s| meshes.join(s.0)));

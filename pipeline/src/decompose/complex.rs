@@ -28,8 +28,9 @@ pub(super) struct HalfArc {
     /// The cell on the other side of an edge where orientations disagree, else [`NONE`].
     pub foe: u32,
     pub length: f64,
-    /// The length that is a feature.
+    /// The length that is a feature, and that weighed by its sharpness.
     pub feature: f64,
+    pub sharp: f64,
     /// A point about half way.
     pub middle: Vec3,
     pub first: HalfEdgeId,
@@ -200,15 +201,16 @@ impl<'a> Tracer<'a> {
             last = self.next(last);
             run.push(last);
         }
-        let features = run.iter().filter(|h| self.dual.is_feature(**h));
+        let length = |h: &HalfEdgeId| self.dual.length(*h);
         HalfArc {
             cell: self.cell(first),
             from: self.dual.from(first) as u32,
             next: NONE,
             twin: NONE,
             foe: self.foe(first),
-            length: run.iter().map(|h| self.dual.length(*h)).sum(),
-            feature: features.map(|h| self.dual.length(*h)).sum(),
+            length: run.iter().map(length).sum(),
+            feature: run.iter().filter(|h| self.dual.is_feature(**h)).map(length).sum(),
+            sharp: run.iter().map(|h| length(h) * self.dual.sharpness(*h)).sum(),
             middle: self.dual.middle(run[run.len() / 2]),
             first,
             last,

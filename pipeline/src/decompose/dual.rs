@@ -21,8 +21,8 @@ struct Side {
 pub(super) struct Dual<'a> {
     pub mesh: &'a SurfaceMesh,
     sides: Vec<Side>,
-    /// Per edge, whether it is a feature: no cell crosses it.
-    pub feature: Vec<bool>,
+    /// Per edge 1 minus the cosine of its dihedral angle, at most 1, if it is a feature: no cell crosses it; else 0.
+    pub sharpness: Vec<f64>,
     points: Vec<Vec3>,
     centroids: Vec<Vec3>,
     areas: Vec<f64>,
@@ -45,7 +45,7 @@ impl<'a> Dual<'a> {
         };
         let mut made = Self {
             sides: (0..3 * triangles.len()).map(|h| side(HalfEdgeId::at(h))).collect(),
-            feature: vec![false; mesh.edges().len()],
+            sharpness: vec![0.0; mesh.edges().len()],
             centroids: triangles.iter().map(centroid).collect(),
             areas: mesh.metric().shapes.iter().map(|s| s.area()).collect(),
             steps: Vec::new(),
@@ -70,7 +70,12 @@ impl<'a> Dual<'a> {
 
     /// Whether the edge along `h` is a feature.
     pub(super) fn is_feature(&self, h: HalfEdgeId) -> bool {
-        self.feature[self.mesh.edges().edge(h).index()]
+        self.sharpness(h) > 0.0
+    }
+
+    /// See the field of this name.
+    pub(super) fn sharpness(&self, h: HalfEdgeId) -> f64 {
+        self.sharpness[self.mesh.edges().edge(h).index()]
     }
 
     /// The vertex at which `h` begins.

@@ -22,8 +22,14 @@ const SIDE: usize = 12;
 /// The least length of connected features, as a share of the size of the surface (the square root of its area).
 const LEAST_LENGTH: f64 = 0.06;
 
-/// The least outline of a patch between features, likewise.
+/// The least outline of a patch between features, likewise, weighed by the sharpness of the features: 1 minus the cosine
+/// of the dihedral angle, at most 1. A bolt hole is a patch, a dent in a scan that is as small is none.
 const LEAST_OUTLINE: f64 = 0.12;
+
+/// What is between features and has a weighed outline below this is no face of its own.
+pub(super) fn least_outline(dual: &Dual) -> f64 {
+    LEAST_OUTLINE * dual.total_area().sqrt()
+}
 
 /// The dual graph of a surface with its feature edges marked, and their number.
 pub(super) fn with_features<'a>(mesh: &'a SurfaceMesh, settings: &Settings) -> (Dual<'a>, usize) {
@@ -45,25 +51,29 @@ fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     let sides = |(h, t): &(HalfEdgeId, HalfEdgeId)| {
         [side(dual, &normals, &candidate, *h), side(dual, &normals, &candidate, *t)]
     };
-    let measured: Vec<_> =
-        candidates.iter().map(|c| (c.0, sides(c))).filter(|(_, [m, n])| is_bent(*m, *n, blunt)).collect();
-    let strong: Vec<bool> = measured.iter().map(|(_, [m, n])| is_bent(*m, *n, sharp)).collect();
-    let kept = long_enough(dual, &measured.iter().map(|m| m.0).collect::<Vec<_>>(), &strong);
-    kept.iter().for_each(|h| dual.feature[dual.mesh.edges().edge(*h).index()] = true);
-    let least = LEAST_OUTLINE * dual.total_area().sqrt();
+    let sharpness = |[m, n]: [Vec3; 2]| 1.0 - dot(m, n) / (norm(m) * norm(n));
+    let measured = candidates.iter().map(|c| (c.0, sharpness(sides(c)).min(1.0)));
+    let kept = long_enough(dual, measured.filter(|m| m.1 > 1.0 - blunt).collect(), 1.0 - sharp);
+    for (h, sharpness) in &kept {
+        dual.sharpness[dual.mesh.edges().edge(*h).index()] = *sharpness;
+    }
+    let kept: Vec<HalfEdgeId> = kept.into_iter().map(|k| k.0).collect();
+    let least = least_outline(dual);
     // Every time some patches are united with others, so that fewer are left.
     while drop_small_patches(dual, &kept, least) {}
-    dual.feature.iter().filter(|f| **f).count()
+    drop_dangling(dual, &kept);
+    dual.sharpness.iter().filter(|s| **s > 0.0).count()
 }
 
-/// Unites each patch whose outline is shorter than `least` with the neighbour with which it shares most: the features
-/// between them are none. Whether there was such a patch.
+/// Unites each patch whose outline, weighed by its sharpness, is shorter than `least` with the neighbour with which it
+/// shares most: the features between them are none. Whether there was such a patch.
 fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId], least: f64) -> bool {
     let (patch_of, count) = patches(dual);
     let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
     let mut outlines = vec![0.0; count];
     for h in dual.half_edges().filter(|h| dual.across(*h).is_none_or(|t| patch(t) != patch(*h))) {
-        outlines[patch(h)] += dual.length(h);
+        let open = if dual.across(h).is_none() { 1.0 } else { 0.0 };
+        outlines[patch(h)] += (dual.sharpness(h) + open) * dual.length(h);
     }
     let both = features.iter().flat_map(|h| [Some(*h), dual.across(*h)]).flatten();
     let pairs = both.filter_map(|h| Some((patch(h), patch(dual.across(h)?), dual.length(h))));
@@ -80,10 +90,20 @@ fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId], least: f64) -> b
         let Some(t) = dual.across(*h).filter(|t| patch(*t) != patch(*h)) else { continue };
         if united.find(patch(t)) == united.find(patch(*h)) {
             let edge = dual.mesh.edges().edge(*h).index();
-            dual.feature[edge] = false;
+            dual.sharpness[edge] = 0.0;
         }
     }
     !between.is_empty()
+}
+
+/// Features that separate nothing are none: a crease that runs out, or noise.
+fn drop_dangling(dual: &mut Dual, features: &[HalfEdgeId]) {
+    let (patch_of, _) = patches(dual);
+    for h in features {
+        if dual.across(*h).is_some_and(|t| patch_of[t.face().index()] == patch_of[h.face().index()]) {
+            dual.sharpness[dual.mesh.edges().edge(*h).index()] = 0.0;
+        }
+    }
 }
 
 /// Per triangle the patch between features to which it belongs, and their number.
@@ -120,16 +140,16 @@ fn side(dual: &Dual, normals: &[Vec3], candidate: &[bool], h: HalfEdgeId) -> Vec
     faces.iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + normals[f.index()][k]))
 }
 
-/// Those of the edges whose connected strong ones are long enough together.
-fn long_enough(dual: &Dual, edges: &[HalfEdgeId], strong: &[bool]) -> Vec<HalfEdgeId> {
+/// Those of the edges, given with their sharpness, whose connected ones above `strong` are long enough together.
+fn long_enough(dual: &Dual, edges: Vec<(HalfEdgeId, f64)>, strong: f64) -> Vec<(HalfEdgeId, f64)> {
     let mut sets = UnionFind::new(dual.mesh.points().len());
-    edges.iter().for_each(|h| {
+    edges.iter().for_each(|(h, _)| {
         sets.unite(dual.from(*h), dual.to(*h));
     });
     let mut lengths = vec![0.0; dual.mesh.points().len()];
-    for (h, _) in edges.iter().zip(strong).filter(|(_, s)| **s) {
+    for (h, _) in edges.iter().filter(|e| e.1 > strong) {
         lengths[sets.find(dual.from(*h))] += dual.length(*h);
     }
     let least = LEAST_LENGTH * dual.total_area().sqrt();
-    edges.iter().copied().filter(|h| lengths[sets.find(dual.from(*h))] >= least).collect()
+    edges.into_iter().filter(|(h, _)| lengths[sets.find(dual.from(*h))] >= least).collect()
 }

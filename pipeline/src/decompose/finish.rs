@@ -5,12 +5,14 @@ use super::clearance::{Gaps, gaps};
 use super::dual::Dual;
 use super::judge::{Verdict, choose_outer, judge};
 use super::merge::Limits;
-use super::network::Network;
-use super::straighten::straighten;
+use super::network::{LEAST, Network};
+use super::shortest::length;
+use super::straighten::{RELAXED, relax, round_off, straighten};
 use super::voronoi::Cells;
 use super::{Error, Settings};
 use crate::atlas::Atlas;
-use crate::id::HalfEdgeId;
+use crate::id::{EdgeId, HalfEdgeId};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
 /// seams along a tube come together. So the area ratio is foretold again after every step, and the last good one kept.
@@ -18,6 +20,9 @@ const BANDS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// How far seams may be straightened, as a share of the narrowest gap beside them.
 const SHARE: f64 = 0.3;
+
+/// A seam is bent if it is so many times as long as it must be.
+const BENT: f64 = 1.15;
 
 /// The parts of seams that are tried one after the other where not all can be straightened at once.
 const PARTS: usize = 8;
@@ -33,22 +38,33 @@ pub(super) fn finish(
 ) -> Result<Atlas, Error> {
     let mut best = Judged::new(Network::new(dual, labels, limits), cells);
     let bands = if best.network.seams().next().is_some() { &BANDS[..] } else { &[] };
-    for band in bands {
+    for (round, band) in bands.iter().enumerate() {
         let gaps = gaps(&best.network);
         let clear = |h: HalfEdgeId| SHARE * gaps.clearance[dual.from(h)].min(gaps.clearance[dual.to(h)]);
         let breadth = |h: HalfEdgeId| clear(h).min(band * size(h));
-        let Err(bad) = best.step(cells, settings.max_area_ratio, &gaps, breadth) else { continue };
+        let step = Step { cells, largest: settings.max_area_ratio, gaps: &gaps, shrink: round == 0 };
+        let Err(bad) = best.step(&step, breadth) else { continue };
         // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
         for part in 0..PARTS {
             let part_of = best.parts(&bad);
             let in_part = |h: HalfEdgeId| if part_of(h).is_none_or(|p| p == part) { breadth(h) } else { 0.0 };
-            let _kept_or_left = best.step(cells, settings.max_area_ratio, &gaps, in_part);
+            let _kept_or_left = best.step(&step, in_part);
         }
     }
-    let Judged { network, verdicts } = best;
+    let Judged { network, verdicts } = best.unbent(cells);
     let mut atlas = assemble(dual.mesh, &network.labels)?;
     choose_outer(&mut atlas, &verdicts);
     Ok(atlas)
+}
+
+/// What holds for a step of straightening.
+struct Step<'a> {
+    cells: &'a Cells,
+    /// The largest area ratio.
+    largest: f64,
+    gaps: &'a Gaps,
+    /// Whether closed seams may shrink at the cost of the ratio.
+    shrink: bool,
 }
 
 /// Seams with what is foretold of their charts.
@@ -63,20 +79,17 @@ impl<'a> Judged<'a> {
         Self { network, verdicts }
     }
 
-    /// Straightens the seams as far as `breadth` allows, if no chart's ratio rises above `largest` by that; otherwise
-    /// all stays, and these charts are returned.
-    fn step(
-        &mut self,
-        cells: &Cells,
-        largest: f64,
-        gaps: &Gaps,
-        breadth: impl Fn(HalfEdgeId) -> f64,
-    ) -> Result<(), Vec<u32>> {
-        let mut network = self.network.begun_anew();
-        straighten(&mut network, &gaps.crossing, breadth);
-        let straight = Self::new(network, cells);
+    /// Straightens the seams as far as `breadth` allows, if no chart's ratio rises above the largest one by that;
+    /// otherwise all stays, and these charts are returned.
+    fn step(&mut self, step: &Step, breadth: impl Fn(HalfEdgeId) -> f64) -> Result<(), Vec<u32>> {
+        let mut straight = self.straightened(step, &breadth);
+        let dear = if step.shrink { BTreeSet::new() } else { self.dearer_loops(&straight) };
+        if !dear.is_empty() {
+            let edges = self.network.dual.mesh.edges();
+            straight = self.straightened(step, |h| if dear.contains(&edges.edge(h)) { 0.0 } else { breadth(h) });
+        }
         let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
-        let worse = |(new, old): (&Option<Verdict>, &Option<Verdict>)| ratio(new) > largest.max(ratio(old));
+        let worse = |(new, old): (&Option<Verdict>, &Option<Verdict>)| ratio(new) > step.largest.max(ratio(old));
         let pairs = straight.verdicts.iter().zip(&self.verdicts);
         let bad: Vec<u32> = pairs.zip(0..).filter(|(pair, _)| worse(*pair)).map(|(_, label)| label).collect();
         if bad.is_empty() && straight.network.is_sound() {
@@ -84,6 +97,52 @@ impl<'a> Judged<'a> {
             return Ok(());
         }
         Err(bad)
+    }
+
+    fn straightened(&self, step: &Step, breadth: impl Fn(HalfEdgeId) -> f64) -> Self {
+        let mut network = self.network.clone().keeping(LEAST);
+        straighten(&mut network, &step.gaps.crossing, breadth);
+        Self::new(network, step.cells)
+    }
+
+    /// The edges of the closed seams between charts for which these became dearer: on a sphere, a loop only becomes
+    /// shorter by shrinking to a point, and the chart around it is the more distorted for it.
+    fn dearer_loops(&self, straight: &Self) -> BTreeSet<EdgeId> {
+        let (before, after) = (self.loops(), straight.loops());
+        let edges = self.network.dual.mesh.edges();
+        let cost = |judged: &Self, pair: &[u32; 2], length: f64| {
+            let of = |label: u32| judged.verdicts[label as usize].map_or(1.0, |v| v.ratio);
+            let area: f64 = pair.iter().map(|l| judged.network.areas[*l as usize]).sum();
+            length / area.sqrt() + of(pair[0]).max(of(pair[1])).log10()
+        };
+        let length = |path: &[HalfEdgeId]| length(self.network.dual, path);
+        let is_dearer = |pair: &[u32; 2], path: &[HalfEdgeId]| {
+            after.get(pair).is_none_or(|a| cost(straight, pair, length(a)) > cost(self, pair, length(path)))
+        };
+        let dearer = before.iter().filter(|(pair, path)| is_dearer(pair, path));
+        dearer.flat_map(|(_, path)| path).map(|h| edges.edge(*h)).collect()
+    }
+
+    /// The half-edges of all closed seams between two charts, by their labels.
+    fn loops(&self) -> BTreeMap<[u32; 2], Vec<HalfEdgeId>> {
+        let mut loops = BTreeMap::<_, Vec<_>>::new();
+        let dual = self.network.dual;
+        for curve in self.network.curves() {
+            let (first, last) = (curve[0], curve[curve.len() - 1]);
+            let Some(beyond) = dual.across(first).filter(|_| dual.from(first) == dual.to(last)) else { continue };
+            let mut pair = [first, beyond].map(|h| self.network.label(h));
+            pair.sort_unstable();
+            loops.entry(pair).or_default().extend(curve);
+        }
+        loops
+    }
+
+    /// The same charts without bent seams, whatever becomes of the ratios: a chart that holds its ratio down by reaching
+    /// around others in fingers had better be split across them.
+    fn unbent(self, cells: &Cells) -> Self {
+        let mut network = self.network.clone().keeping(RELAXED);
+        let changed = relax(&mut network, BENT) | round_off(&mut network);
+        if changed && network.is_sound() { Self::new(network, cells) } else { self }
     }
 
     /// Per half-edge on a seam of the charts `labels` its part, counted along the seam; none elsewhere.

@@ -67,7 +67,11 @@ pub(super) struct Merge<'a, 'b> {
     pub limits: Limits,
     pub weights: Weights,
     /// Per region its area ratio, as far as it is known, else 1.
-    pub ratios: Vec<f64>,
+    pub ratios: &'b mut [f64],
+    /// Per region its group: only regions of the same group are united.
+    pub groups: Vec<u32>,
+    /// Features block unions, but not that of a region around which there is no more of them, weighed by sharpness.
+    pub least_outline: f64,
 }
 
 impl Merge<'_, '_> {
@@ -104,7 +108,10 @@ impl Merge<'_, '_> {
     /// A legal union. Its ratio is not known yet: it is taken to be that of its parts, as solving for it costs most,
     /// and many candidates are overtaken before.
     fn candidate(&mut self, (a, b): (u32, u32), version: &[u32]) -> Option<Candidate> {
-        let union = self.regions.union(a, b).filter(|u| self.is_allowed(u))?;
+        if self.groups[a as usize] != self.groups[b as usize] {
+            return None;
+        }
+        let union = self.regions.union(a, b).filter(|u| self.is_allowed((a, b), u))?;
         let ratio = self.ratios[a as usize].max(self.ratios[b as usize]);
         let versions = (version[a as usize], version[b as usize]);
         Some(Candidate { cost: self.cost((a, b), &union, ratio), pair: (a, b), versions, ratio: None })
@@ -123,9 +130,13 @@ impl Merge<'_, '_> {
     }
 
     /// Whether the union may be a chart, its distortion apart.
-    fn is_allowed(&self, union: &Union) -> bool {
+    fn is_allowed(&self, (a, b): (u32, u32), union: &Union) -> bool {
+        let sharp = |region: u32| {
+            let region = &self.regions.all[region as usize];
+            region.boundary.iter().map(|a| self.regions.complex.arcs[*a as usize].sharp).sum::<f64>()
+        };
         self.limits.allow(&self.regions.shape(&union.region, &union.outline))
-            && 2.0 * union.shared_feature <= union.shared
+            && (2.0 * union.shared_feature <= union.shared || sharp(a).min(sharp(b)) < self.least_outline)
     }
 
     fn cost(&self, (a, b): (u32, u32), union: &Union, ratio: f64) -> f64 {

@@ -4,19 +4,22 @@
 //! vertex. Any surface is cut into charts: closed ones, of any genus, of several components, with holes; one that
 //! cannot be oriented is cut where its triangles disagree. A component that can be one chart is left whole.
 //!
-//! 1. Feature edges are found ([`Settings::feature_angle`]); no chart crosses those that separate it from another.
+//! 1. Feature edges are found ([`Settings::feature_angle`]): creases that part one face from another.
 //! 2. The triangles are gathered into some hundred compact cells, by geodesic distance: what follows depends on the
 //!    shape, not on the triangulation.
 //! 3. Charts grow from a few dozen groups of cells: the cheapest pair of neighbours is united again and again, as
 //!    long as the union is legal (its Euler number, its loops) and its area ratio, predicted by a harmonic map of the
-//!    graph of cells, is small enough. This is done several ways; few charts win, then short seams and small ratios.
-//! 4. Seams are straightened on the triangulation itself, a little at a time, while the predicted ratio allows it.
+//!    graph of cells, is small enough. This is done several ways, some of them from the two sides of the shape; the
+//!    one is taken that has the fewest charts once its seams are straight.
+//! 4. Seams are straightened on the triangulation itself, a little at a time, while the predicted ratio allows it; and
+//!    those that are crooked even so are pulled straight, whatever the ratio.
 //! 5. The outer loop of every chart is the one that is predicted to distort it least.
 //!
 //! What the maps themselves show too distorted is [`split()`]; ears are split by [`split_ears`]. The cost is that of
 //! sorting, but for a fixed number of cells; every loop has its reason to end beside it.
 
 mod assemble;
+mod choice;
 mod clearance;
 mod complex;
 mod dual;
@@ -34,6 +37,7 @@ mod predict;
 mod regions;
 mod search;
 mod shortest;
+mod sides;
 mod split;
 mod straighten;
 mod voronoi;
@@ -42,10 +46,11 @@ use crate::atlas::Atlas;
 use crate::id::HalfEdgeId;
 use crate::mesh::SurfaceMesh;
 pub use assemble::assemble;
+use choice::choose;
 use complex::Complex;
 use dual::Dual;
 pub use ears::{WithoutEars, split_ears};
-use features::with_features;
+use features::{least_outline, with_features};
 use finish::finish;
 pub use legality::Illegal;
 use merge::Limits;
@@ -93,7 +98,9 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
     let limits = Limits::new(settings);
     let (cells, complex) = cells(&dual, &limits);
     let graph = CellGraph::new(&complex);
-    let charts = Search { complex: &complex, graph: &graph, limits, bound: settings.max_area_ratio }.run();
+    let search = Search { complex: &complex, graph: &graph, limits, bound: settings.max_area_ratio };
+    let charts = choose(&dual, &cells, &search.run(), limits, settings.max_area_ratio);
+    let charts = search.absorb(charts, least_outline(&dual));
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
     let size = |h: HalfEdgeId| graph.area(cells.of[h.face().index()]).sqrt();
     let atlas = finish(&dual, labels, limits, settings, &cells, size)?;

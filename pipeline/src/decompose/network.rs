@@ -7,8 +7,8 @@ use super::merge::Limits;
 use crate::id::HalfEdgeId;
 use crate::union_find::UnionFind;
 
-/// A chart keeps at least this share of its area.
-const LEAST: f64 = 0.5;
+/// A chart keeps at least this share of its area in a step of straightening.
+pub(super) const LEAST: f64 = 0.5;
 
 /// Marks vertices where the surface does not end.
 const INNER: u32 = u32::MAX;
@@ -19,7 +19,7 @@ pub(super) struct Network<'a> {
     pub dual: &'a Dual<'a>,
     pub labels: Vec<u32>,
     pub limits: Limits,
-    /// Per label, its area at first: it keeps at least half of it.
+    /// Per label the area that it keeps at least, and the one that it has.
     pub least: Vec<f64>,
     pub areas: Vec<f64>,
     /// Per label, its triangles, the vertices inside it, and the half-edges around it.
@@ -70,7 +70,6 @@ impl<'a> Network<'a> {
             made.sizes[*label as usize] += 1;
             made.areas[*label as usize] += dual.area(f);
         }
-        made.least = made.areas.iter().map(|a| LEAST * a).collect();
         for h in dual.half_edges() {
             made.out[dual.from(h)] = h;
             match dual.across(h) {
@@ -87,12 +86,12 @@ impl<'a> Network<'a> {
         for v in 0..vertices {
             made.count_inside(v, 1);
         }
-        made
+        made.keeping(LEAST)
     }
 
-    /// The same charts, with the areas that they have now to begin with.
-    pub(super) fn begun_anew(&self) -> Self {
-        Self { least: self.areas.iter().map(|a| LEAST * a).collect(), ..self.clone() }
+    /// The same charts, which keep at least this share of the areas that they have now.
+    pub(super) fn keeping(self, share: f64) -> Self {
+        Self { least: self.areas.iter().map(|a| share * a).collect(), ..self }
     }
 
     /// Makes the edge along `h` a seam or none.

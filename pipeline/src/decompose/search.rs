@@ -1,22 +1,44 @@
-//! The search for few charts: growing them several ways, and keeping the best of each component.
+//! The search for few charts: growing them several ways, and ranking these for each component.
 //!
 //! Growing is greedy, and what is cheap early may bar the way later. It costs little on the graph of cells: so it is
-//! done from several numbers of regions and with several weights. Fewer charts win; then short seams and a small area
-//! ratio. A component that can be one chart is left whole.
+//! done from several numbers of regions, with several weights, and from the two sides of the shape. Fewer charts win;
+//! then short seams and a small area ratio. A component that can be one chart is left whole.
 
 use super::complex::{Complex, NONE};
 use super::merge::{Limits, Merge, Weights};
 use super::predict::{CellGraph, area_ratio};
 use super::regions::{Outline, Region, Regions};
+use super::sides::{Axes, axes, faces};
 use super::voronoi::{Cells, bisect_until, farthest_first};
 
 const BALANCED: Weights = Weights { ratio: 1.0, roundness: 0.6, spread: 0.5, shared: 0.0 };
 const COMPACT: Weights = Weights { ratio: 0.5, roundness: 0.6, spread: 0.5, shared: 1.0 };
 
-/// Regions per component to begin with, and weights. (Of fifteen ways that were tried on 25 surfaces, these found the
-/// fewest charts between them.)
-const WAYS: [(usize, Weights); 6] =
-    [(96, BALANCED), (128, BALANCED), (160, BALANCED), (240, BALANCED), (96, COMPACT), (240, COMPACT)];
+/// One way of growing charts.
+struct Way {
+    /// Regions per component to begin with.
+    regions: usize,
+    weights: Weights,
+    /// The axis (see [`axes`]) on either side of which charts grow before they may cross over.
+    axis: Option<usize>,
+}
+
+const fn way(regions: usize, weights: Weights, axis: Option<usize>) -> Way {
+    Way { regions, weights, axis }
+}
+
+/// (Of fifteen ways without sides that were tried on 25 surfaces, these found the fewest charts between them.)
+const WAYS: [Way; 9] = [
+    way(96, BALANCED, None),
+    way(128, BALANCED, None),
+    way(160, BALANCED, None),
+    way(240, BALANCED, None),
+    way(96, COMPACT, None),
+    way(240, COMPACT, None),
+    way(160, BALANCED, Some(0)),
+    way(160, BALANCED, Some(1)),
+    way(160, BALANCED, Some(2)),
+];
 
 /// What seams as long as the square root of the area count, against a decade of the worst area ratio. (They will be a
 /// third shorter when they are straight.)
@@ -36,33 +58,55 @@ const WHOLE: f64 = 0.5;
 
 /// What became of the component in one of the ways; less is better.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-struct Score {
-    charts: usize,
+pub(super) struct Score {
+    pub charts: usize,
     beauty: f64,
 }
 
+/// What the search found.
+pub(super) struct Found {
+    /// The components of the cells.
+    pub components: Cells,
+    /// Per component the ways that lead to charts, the best first.
+    pub ranked: Vec<Vec<(Score, usize)>>,
+    /// Per way, for each cell its chart.
+    ways: Vec<Vec<u32>>,
+}
+
+impl Found {
+    /// Per cell its chart, each component grown in the way that is `chosen` for it.
+    pub(super) fn charts(&self, chosen: &[usize]) -> Cells {
+        // Charts of different ways have different numbers.
+        let span = self.components.of.len();
+        let chart = |(cell, component): (usize, &u32)| {
+            let way = chosen[*component as usize];
+            (way * span + self.ways[way][cell] as usize) as u32
+        };
+        Cells::renumbered(self.components.of.iter().enumerate().map(chart).collect())
+    }
+}
+
 impl Search<'_> {
-    /// Per cell its chart.
-    pub(super) fn run(&self) -> Cells {
+    pub(super) fn run(&self) -> Found {
         let components = farthest_first(self.graph, |_| 1);
         let whole = Regions::new(self.complex, components.of.clone(), components.count);
         let whole = self.fine(whole, WHOLE * self.bound);
-        let mut best: Vec<(Score, usize)> = whole.iter().map(|w| (Score::of_whole(*w), 0)).collect();
         let mut ways = vec![components.of.clone()];
-        for (count, weights) in WAYS.iter().filter(|_| whole.contains(&false)) {
-            let (of, scores) = self.way(*count, *weights, &components, &whole);
-            for (best, score) in best.iter_mut().zip(scores) {
-                if score < best.0 {
-                    *best = (score, ways.len());
-                }
+        let left_whole = |w: &bool| if *w { vec![(Score { charts: 1, beauty: 0.0 }, 0)] } else { vec![] };
+        let mut ranked: Vec<Vec<(Score, usize)>> = whole.iter().map(left_whole).collect();
+        let axes = axes(self.complex, &components);
+        for way in WAYS.iter().filter(|_| whole.contains(&false)) {
+            let (of, scores) = self.grow(way, &components, &axes, &whole);
+            for (ranked, score) in ranked.iter_mut().zip(scores).zip(&whole).filter(|(_, w)| !**w).map(|(r, _)| r) {
+                ranked.push((score, ways.len()));
             }
             ways.push(of);
         }
-        // Charts of different ways have different numbers.
-        let span = self.complex.cells.len() as u32;
-        let chosen = |cell: usize| best[components.of[cell] as usize].1;
-        let of = (0..self.complex.cells.len()).map(|c| chosen(c) as u32 * span + ways[chosen(c)][c]).collect();
-        Cells::renumbered(of)
+        let order = |a: &(Score, usize), b: &(Score, usize)| {
+            a.0.charts.cmp(&b.0.charts).then(a.0.beauty.total_cmp(&b.0.beauty)).then(a.1.cmp(&b.1))
+        };
+        ranked.iter_mut().for_each(|r| r.sort_by(order));
+        Found { components, ranked, ways }
     }
 
     /// Per region, whether it may be a chart with at most this area ratio.
@@ -76,19 +120,45 @@ impl Search<'_> {
     }
 
     /// Grows charts one way: per cell its chart, and the score of every component.
-    fn way(&self, count: usize, weights: Weights, components: &Cells, whole: &[bool]) -> (Vec<u32>, Vec<Score>) {
+    fn grow(&self, way: &Way, components: &Cells, axes: &[Axes], whole: &[bool]) -> (Vec<u32>, Vec<Score>) {
         let is_whole = |cell: usize| whole[components.of[cell] as usize];
-        let groups = farthest_first(self.graph, |part| if is_whole(part[0]) { 1 } else { count });
+        let groups = farthest_first(self.graph, |part| if is_whole(part[0]) { 1 } else { way.regions });
         let groups = bisect_until(self.graph, groups, |groups| {
             self.fine(Regions::new(self.complex, groups.of.clone(), groups.count), self.limits.area_ratio)
         });
         let mut regions = Regions::new(self.complex, groups.of, groups.count);
-        let ratios = vec![1.0; groups.count];
-        let mut merge = Merge { regions: &mut regions, graph: self.graph, limits: self.limits, weights, ratios };
-        merge.run();
-        let ratios = merge.ratios;
+        let component = |r: &Region| r.cells.first().map_or(0, |c| components.of[*c as usize]);
+        let side = |axis: usize| {
+            let is_front = |r: &Region| faces(r, axes[component(r) as usize][axis]);
+            regions.all.iter().map(|r| 2 * component(r) + u32::from(is_front(r))).collect::<Vec<u32>>()
+        };
+        let wholes = regions.all.iter().map(component).collect();
+        let rounds: Vec<Vec<u32>> = way.axis.map(side).into_iter().chain([wholes]).collect();
+        let mut ratios = vec![1.0; groups.count];
+        for groups in rounds {
+            let (graph, limits, weights) = (self.graph, self.limits, way.weights);
+            Merge { regions: &mut regions, graph, limits, weights, ratios: &mut ratios, groups, least_outline: 0.0 }
+                .run();
+        }
+        let scores = self.scores(&regions, &ratios, components);
+        (regions.of_cell, scores)
+    }
+
+    /// Unites charts across features wherever these are not sharp and long enough to part them, whatever their
+    /// component.
+    pub(super) fn absorb(&self, charts: Cells, least_outline: f64) -> Cells {
+        let count = charts.count;
+        let mut regions = Regions::new(self.complex, charts.of, count);
+        let (graph, limits, weights) = (self.graph, self.limits, BALANCED);
+        let (mut ratios, groups) = (vec![1.0; count], vec![0; count]);
+        Merge { regions: &mut regions, graph, limits, weights, ratios: &mut ratios, groups, least_outline }.run();
+        Cells::renumbered(regions.of_cell)
+    }
+
+    /// The score of every component.
+    fn scores(&self, regions: &Regions, ratios: &[f64], components: &Cells) -> Vec<Score> {
         let mut sums = vec![(0, 0.0, 0.0, 1.0_f64); components.count];
-        for (region, ratio) in regions.all.iter().zip(&ratios).filter(|(r, _)| !r.cells.is_empty()) {
+        for (region, ratio) in regions.all.iter().zip(ratios).filter(|(r, _)| !r.cells.is_empty()) {
             let (charts, seams, area, worst) = &mut sums[components.of[region.cells[0] as usize] as usize];
             let seam = region.boundary.iter().map(|a| &self.complex.arcs[*a as usize]).filter(|a| a.twin != NONE);
             *charts += 1;
@@ -100,13 +170,6 @@ impl Search<'_> {
             charts,
             beauty: SEAMS * seams / area.sqrt() + worst.log10(),
         };
-        (regions.of_cell, sums.into_iter().map(score).collect())
-    }
-}
-
-impl Score {
-    /// The score of a component that is left whole: nothing beats a chart, anything beats what is none.
-    fn of_whole(is_chart: bool) -> Self {
-        Self { charts: if is_chart { 0 } else { usize::MAX }, beauty: 0.0 }
+        sums.into_iter().map(score).collect()
     }
 }

@@ -78,7 +78,7 @@ impl Tree {
             now: 0,
             known: vec![unknown; dual.mesh.points().len()],
             heap: BinaryHeap::new(),
-            floor: if dual.feature.contains(&true) { FEATURE } else { 1.0 },
+            floor: if dual.sharpness.iter().any(|s| *s > 0.0) { FEATURE } else { 1.0 },
             settled: Vec::new(),
         }
     }

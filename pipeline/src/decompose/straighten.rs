@@ -36,6 +36,8 @@ struct Straightening<'n, 'a> {
     band: Vec<bool>,
     /// Per edge, whether no seam may move along it.
     barred: &'n [bool],
+    /// A change is made where the length falls to this share.
+    share: f64,
     /// The seams, and the corners with their seams, that were tried in vain: they are not tried again before they
     /// have changed.
     vain: BTreeSet<(Option<usize>, Vec<HalfEdgeId>)>,
@@ -45,11 +47,9 @@ struct Straightening<'n, 'a> {
 /// `barred` edge. Whether they became so much shorter that it is worth while to do it again.
 pub(super) fn straighten(network: &mut Network, barred: &[bool], breadth: impl Fn(HalfEdgeId) -> f64) -> bool {
     let dual = network.dual;
-    let tree = || Tree::new(dual);
     let reach = REACH * (dual.total_area() / network.charts().max(1) as f64).sqrt();
     let band = band(network, breadth);
-    let trees = [tree(), tree(), tree()];
-    let mut work = Straightening { network, dual, trees, reach, band, barred, vain: BTreeSet::new() };
+    let mut work = Straightening::new(network, reach, band, barred);
     let mut lengths = vec![work.total()];
     let is_worth = |after: f64, before: f64| after < (1.0 - LEAST_GAIN) * before;
     for round in 0..ROUNDS {
@@ -63,7 +63,55 @@ pub(super) fn straighten(network: &mut Network, barred: &[bool], breadth: impl F
     is_worth(lengths[lengths.len() - 1], lengths[0])
 }
 
-impl Straightening<'_, '_> {
+/// Pulls straight all seams, and parts of them, that are more than `bent` times as long as they must be, as far as the
+/// others let it, and whatever becomes of the charts, as long as they are legal. Corners stay where they are, and
+/// closed seams are held at [`PINS`] of their vertices. Whether anything changed.
+pub(super) fn relax(network: &mut Network, bent: f64) -> bool {
+    let everywhere = vec![true; network.dual.mesh.points().len()];
+    let barred = vec![false; network.dual.mesh.edges().len()];
+    let mut work = Straightening { share: 1.0 / bent, ..Straightening::new(network, 0.0, everywhere, &barred) };
+    let mut changed = false;
+    for round in 0..ROUNDS {
+        for path in work.network.curves() {
+            let closed = work.is_closed(&path);
+            // The vertices that hold a closed one are not known any more in the next round.
+            let pieces = if closed { PINS } else { 1 };
+            for part in path.chunks(path.len().div_ceil(pieces)).filter(|_| !closed || round == 0) {
+                changed |= work.shorten_all(part.to_vec());
+            }
+        }
+    }
+    changed
+}
+
+/// Takes the corners out of closed seams, at little cost of the area inside. Whether anything changed.
+pub(super) fn round_off(network: &mut Network) -> bool {
+    let everywhere = vec![true; network.dual.mesh.points().len()];
+    let barred = vec![false; network.dual.mesh.edges().len()];
+    let mut work = Straightening::new(network, 0.0, everywhere, &barred);
+    let mut changed = false;
+    for path in work.network.curves() {
+        changed |= work.is_closed(&path) && work.shorten_loop(path, EIGHTHS, 2 * EIGHTHS);
+    }
+    changed
+}
+
+/// A closed seam is rounded off in so many parts: between these, a circle loses a tenth of its area.
+const EIGHTHS: usize = 8;
+
+/// A chart whose seams are relaxed had better keep this share of its area: two seams may come to lie side by side.
+pub(super) const RELAXED: f64 = 0.1;
+
+/// Vertices that hold a closed seam: on a sphere it would shrink to a point.
+const PINS: usize = 4;
+
+impl<'n, 'a> Straightening<'n, 'a> {
+    fn new(network: &'n mut Network<'a>, reach: f64, band: Vec<bool>, barred: &'n [bool]) -> Self {
+        let dual = network.dual;
+        let trees = [(); 3].map(|()| Tree::new(dual));
+        Self { network, dual, trees, reach, band, barred, share: 1.0 - GAIN, vain: BTreeSet::new() }
+    }
+
     fn total(&self) -> f64 {
         0.5 * self.network.seams().map(|h| weight(self.dual, h)).sum::<f64>()
     }
@@ -71,13 +119,13 @@ impl Straightening<'_, '_> {
     /// One pass over all seams.
     fn seams(&mut self) {
         for path in self.network.curves() {
-            let closed = self.dual.from(path[0]) == self.dual.to(path[path.len() - 1]);
+            let closed = self.is_closed(&path);
             let tried = (None, path);
             if self.vain.contains(&tried) {
                 continue;
             }
             let path = tried.1.clone();
-            let shorter = if closed { self.shorten_loop(path) } else { self.shorten_all(path) };
+            let shorter = if closed { self.shorten_loop(path, 3, 12) } else { self.shorten_all(path) };
             if !shorter {
                 self.vain.insert(tried);
             }
@@ -118,7 +166,7 @@ impl Straightening<'_, '_> {
         let bounds = Bounds {
             goal: Goal::Vertex(to),
             labels: &labels,
-            length: (1.0 - GAIN) * before,
+            length: self.share * before,
             band: &self.band,
             barred: self.barred,
         };
@@ -132,19 +180,23 @@ impl Straightening<'_, '_> {
         if laid { Ok(half_edges) } else { Err(false) }
     }
 
-    /// A closed seam: its thirds, then thirds that begin in the middle of these. Whether it became shorter.
-    fn shorten_loop(&mut self, mut path: Vec<HalfEdgeId>) -> bool {
+    fn is_closed(&self, path: &[HalfEdgeId]) -> bool {
+        self.dual.from(path[0]) == self.dual.to(path[path.len() - 1])
+    }
+
+    /// A closed seam: its parts, then those that begin in the middle of these. Whether it became shorter.
+    fn shorten_loop(&mut self, mut path: Vec<HalfEdgeId>, parts: usize, turns: usize) -> bool {
         let mut shorter = false;
-        for turn in 0..12 {
-            let third = path.len() / 3;
-            if third < 2 {
+        for turn in 0..turns {
+            let part = path.len() / parts;
+            if part < 2 {
                 break;
             }
-            if let Ok(piece) = self.shorten(&path[..third]) {
-                path.splice(..third, piece);
+            if let Ok(piece) = self.shorten(&path[..part]) {
+                path.splice(..part, piece);
                 shorter = true;
             }
-            let step = if turn % 3 == 2 { third / 2 } else { third };
+            let step = if turn % parts == parts - 1 { part / 2 } else { part };
             path.rotate_left(step);
         }
         shorter
@@ -199,7 +251,7 @@ impl Straightening<'_, '_> {
 
     /// The ways from the vertex where the sum of the distances to three `ends` is least, if it is less than `before`.
     fn meeting(&mut self, ends: &[usize], labels: &[u32], before: f64) -> Option<Vec<Vec<HalfEdgeId>>> {
-        let length = (1.0 - GAIN) * before;
+        let length = self.share * before;
         let [first, second, third] = &mut self.trees;
         let meeting =
             |a, b| Bounds { goal: Goal::Meeting([a, b]), labels, length, band: &self.band, barred: self.barred };
@@ -214,7 +266,7 @@ impl Straightening<'_, '_> {
         let all = on_way.len();
         on_way.sort_unstable();
         on_way.dedup();
-        (least < (1.0 - GAIN) * before && on_way.len() == all).then_some(ways)
+        (least < self.share * before && on_way.len() == all).then_some(ways)
     }
 
     /// Moves the end of a seam along the open boundary to where the seam is shortest.
@@ -228,7 +280,7 @@ impl Straightening<'_, '_> {
         let bounds = Bounds {
             goal: Goal::OpenLoop(end),
             labels: &labels,
-            length: (1.0 - GAIN) * before,
+            length: self.share * before,
             band: &self.band,
             barred: self.barred,
         };

@@ -177,3 +177,71 @@ fn illegal_charts_are_named() {
     (labels[0], labels[apart.expect("one across")]) = (0, 0);
     assert!(assemble(&disk, &labels).is_err());
 }
+
+/// A tube, open at both ends, `length` times as long as wide.
+fn tube(around: u32, length: u32) -> TriangleSoup {
+    let rings = around * length / 3;
+    let corner = |k: u32| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(k % around) / f64::from(around)).sin_cos();
+        [cos, sin, 2.0 * f64::from(length) * f64::from(k / around) / f64::from(rings)]
+    };
+    let quad = |k: u32| {
+        let (row, a, b) = (k / around * around, k % around, (k + 1) % around);
+        let [a, b, c, d] = [row + a, row + b, row + around + b, row + around + a];
+        [[a, b, c], [a, c, d]]
+    };
+    let points = (0..around * (rings + 1)).map(corner).collect();
+    TriangleSoup::new(points, (0..around * rings).flat_map(quad).collect()).expect("sound")
+}
+
+fn seam_length(mesh: &SurfaceMesh, atlas: &Atlas) -> f64 {
+    let network = crate::seams::SeamNetwork::new(mesh, atlas.charts());
+    network.seams().map(crate::seams::Curve::length).sum()
+}
+
+#[test]
+fn a_long_tube_is_cut_along_straight_lines() {
+    // As one chart its area ratio would be e^40. Two strips have two seams, as long as the tube.
+    let mesh = surface(&tube(24, 10));
+    let atlas = decompose(&mesh, &smooth()).expect("an atlas");
+    assert_eq!(atlas.charts().len(), 2);
+    let length = seam_length(&mesh, &atlas);
+    assert!((39.9..1.05 * 40.0).contains(&length), "{length}");
+}
+
+#[test]
+fn fingers_are_pulled_straight() {
+    // Two combs that reach into each other in a disk of diameter 2.
+    let mesh = surface(&shapes::flat_disk(40));
+    let dual = Dual::new(&mesh);
+    let limits = Limits::new(&smooth());
+    let (cells, _) = cells(&dual, &limits);
+    let place = |f: usize| dual.centroid(f).map(|x| x / mesh.metric().scale);
+    let comb = |[x, y, _]: [f64; 3]| u32::from(x > 0.7 * (9.0 * y).sin() * (1.0 - y * y));
+    let labels: Vec<u32> = (0..mesh.triangles().len()).map(|f| comb(place(f))).collect();
+    let crooked = seam_length(&mesh, &assemble(&mesh, &labels).expect("two disks"));
+    let size = (dual.total_area() / cells.count as f64).sqrt();
+    let atlas = finish(&dual, labels, limits, &smooth(), &cells, |_| size).expect("two disks");
+    let straight = seam_length(&mesh, &atlas);
+    assert!(crooked > 5.0 && straight < 2.2, "{crooked} becomes {straight}");
+}
+
+#[test]
+fn a_sphere_falls_into_parts_of_some_size() {
+    // The shortest loops on a sphere are points: what is left is a chart that is closed all but for a pinhole.
+    let atlas = atlas(&shapes::sphere(24), &smooth());
+    let shares = atlas.charts().iter().map(|c| c.triangles().len() as f64 / (4.0 * 24.0 * 23.0));
+    assert!(atlas.charts().len() == 2 && shares.clone().all(|s| s > 0.1), "{:?}", shares.collect::<Vec<_>>());
+}
+
+#[test]
+fn a_crease_that_runs_out_is_no_feature() {
+    let creased = |to: f64| {
+        let disk = shapes::flat_disk(30);
+        let crease = |p: &[f64; 3]| [p[0], p[1], 2.0 * (p[0] - to).max(0.0) * p[1].abs()];
+        TriangleSoup::new(disk.points().iter().map(crease).collect(), disk.triangles().to_vec()).expect("sound")
+    };
+    let (ends, parts) = (atlas(&creased(0.0), &Settings::default()), atlas(&creased(-3.0), &Settings::default()));
+    assert_eq!((ends.charts().len(), ends.feature_edges()), (1, 0));
+    assert_eq!((parts.charts().len(), parts.feature_edges()), (2, 60));
+}

@@ -1,0 +1,63 @@
+//! Which of the ways that the search found is taken: the one with the fewest charts when its seams are straight.
+//!
+//! Charts that reach around each other in fingers can hold their area ratios down with few charts. But the seams
+//! between them are crooked, and when they are pulled straight the fingers vanish and the ratios rise, until the charts
+//! must be split. So a way counts as many charts as there will be then.
+
+use super::dual::Dual;
+use super::judge::{Verdict, judge};
+use super::merge::Limits;
+use super::network::Network;
+use super::search::Found;
+use super::straighten::{RELAXED, relax};
+use super::voronoi::Cells;
+
+/// A chart is taken to need at most this many more.
+const MOST: f64 = 9.0;
+
+/// Per cell its chart. `bound` is the largest area ratio.
+pub(super) fn choose(dual: &Dual, cells: &Cells, found: &Found, limits: Limits, bound: f64) -> Cells {
+    let mut best: Vec<usize> = found.ranked.iter().map(|ways| ways.first().map_or(0, |w| w.1)).collect();
+    let mut needed = vec![usize::MAX; best.len()];
+    // Ways are ranked by their charts, which are never more than those needed: the rest cannot be better then.
+    let ways = found.ranked.iter().map(Vec::len).max().unwrap_or(0);
+    for rank in 0..ways {
+        let next = |component: usize| found.ranked[component].get(rank);
+        let is_open = |c: &usize| found.ranked[*c].len() > 1 && next(*c).is_some_and(|w| w.0.charts < needed[*c]);
+        let open: Vec<usize> = (0..best.len()).filter(is_open).collect();
+        if open.is_empty() {
+            break;
+        }
+        let mut tried = best.clone();
+        open.iter().for_each(|c| tried[*c] = next(*c).map_or(tried[*c], |w| w.1));
+        let counts = needed_charts(dual, cells, found, &tried, limits, bound);
+        for c in open {
+            if counts[c] < needed[c] {
+                (needed[c], best[c]) = (counts[c], tried[c]);
+            }
+        }
+    }
+    found.charts(&best)
+}
+
+/// Per component, the charts of the ways that are `tried`, once their seams are straight and the charts that are too
+/// distorted then are split.
+fn needed_charts(dual: &Dual, cells: &Cells, found: &Found, tried: &[usize], limits: Limits, bound: f64) -> Vec<usize> {
+    let charts = found.charts(tried);
+    let mut component = vec![0; charts.count];
+    charts.of.iter().zip(&found.components.of).for_each(|(chart, c)| component[*chart as usize] = *c as usize);
+    let labels = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
+    let mut network = Network::new(dual, labels, limits).keeping(RELAXED);
+    relax(&mut network, 1.0);
+    let mut counts = vec![0; tried.len()];
+    for (component, verdict) in component.into_iter().zip(judge(&network, cells)) {
+        counts[component] += parts(verdict, bound);
+    }
+    counts
+}
+
+/// How many charts one with this verdict becomes: the ratio of each part is the largest one.
+fn parts(verdict: Option<Verdict>, bound: f64) -> usize {
+    let ratio = verdict.map_or(1.0, |v| v.ratio);
+    (ratio.ln() / bound.ln()).ceil().clamp(1.0, MOST) as usize
+}
