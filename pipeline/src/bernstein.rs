@@ -8,7 +8,7 @@
 //! Bounds by subdivision (Johnen, Remacle and Geuzaine 2013, doi 10.1016/j.jcp.2012.08.051) serve the reported
 //! lower bound only: they never decide a double root.
 
-use crate::grid::{GridPoint, UNITS, WideVector, bezier_control};
+use crate::grid::{GridPoint, GridVector, UNITS, bezier_control};
 use num_bigint::BigInt;
 
 /// How deep triangles are subdivided for the reported lower bound: integers of that depth still fit `i128`.
@@ -125,8 +125,8 @@ impl ExactDet {
     }
 }
 
-fn twice(v: WideVector) -> WideVector {
-    WideVector { x: 2 * v.x, y: 2 * v.y }
+fn twice(v: GridVector) -> GridVector {
+    GridVector { x: 2 * v.x, y: 2 * v.y }
 }
 
 /// The least and the largest value over the triangle of the quadratic polynomial with these Bernstein

@@ -169,11 +169,17 @@ pub enum SplitError {
 /// feasible start.
 pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
     let MappedChart { closed, linear, start, certified_start, harmonic } = mapped;
-    let (certified, start_map) = (certified_start.clone(), certified_start);
-    let base = CertifiedChart { certified, start: start_map, linear, harmonic: None, untangle: None, unsolved: None };
+    let of_start = |start: CertifiedMap, linear, unsolved| CertifiedChart {
+        certified: start.clone(),
+        start,
+        linear,
+        harmonic: None,
+        untangle: None,
+        unsolved,
+    };
     let map = match harmonic {
-        None => return base,
-        Some(Err(unsolved)) => return CertifiedChart { unsolved: Some(unsolved), ..base },
+        None => return of_start(certified_start, linear, None),
+        Some(Err(unsolved)) => return of_start(certified_start, linear, Some(unsolved)),
         Some(Ok(map)) => map,
     };
     let mut invalid = vec![false; closed.own_triangles()];
@@ -184,10 +190,11 @@ pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
         Ok(certified) => certified,
         Err(_) => {
             report = report.of_start(&closed, &start, &map);
-            base.certified
+            certified_start.clone()
         }
     };
-    CertifiedChart { certified, harmonic: Some(found), untangle: Some(report), ..base }
+    let (harmonic, untangle) = (Some(found), Some(report));
+    CertifiedChart { certified, start: certified_start, linear, harmonic, untangle, unsolved: None }
 }
 
 /// The part of a map that is published: the chart without its fans.

@@ -6,6 +6,7 @@
 //! part of the result.
 
 use crate::atlas::Chart;
+use crate::elimination;
 use crate::id::{HalfEdgeId, VertexId};
 use crate::mesh::{EdgeTable, TriangleShape};
 use std::f64::consts::TAU;
@@ -25,6 +26,7 @@ pub struct ClosedChart {
     holes: usize,
     outer: Vec<HalfEdgeId>,
     loops: Vec<Vec<HalfEdgeId>>,
+    elimination: Vec<VertexId>,
 }
 
 impl ClosedChart {
@@ -44,7 +46,9 @@ impl ClosedChart {
                 shapes.push(TriangleShape { lengths: [*length, leg, leg] });
             }
         }
+        let vertices = own_vertices + chart.holes().len();
         Self {
+            elimination: elimination::of_vertices(&triangles, vertices, chart.outer()),
             edges: if chart.holes().is_empty() { chart.edges().clone() } else { EdgeTable::new(&triangles) },
             triangles,
             shapes,
@@ -105,6 +109,12 @@ impl ClosedChart {
     /// The loops around the holes, with the chart on their left.
     pub fn loops(&self) -> &[Vec<HalfEdgeId>] {
         &self.loops
+    }
+
+    /// The vertices that are not on the outer loop, in an order in which to eliminate them from a system: one that
+    /// keeps its factor small.
+    pub fn elimination(&self) -> &[VertexId] {
+        &self.elimination
     }
 
     /// The node at a vertex.

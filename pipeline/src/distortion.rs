@@ -105,12 +105,13 @@ pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summ
 fn star_scales(chart: &Chart, plane: &[f64]) -> Vec<(f64, f64)> {
     let stars = Stars::new(chart.triangles(), chart.vertices().len());
     let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
-    let mut seen = vec![u32::MAX; space.len()];
+    let (mut seen, mut seen_corner) = (vec![u32::MAX; space.len()], vec![u32::MAX; chart.vertices().len()]);
     let mut two_rings = |v: usize| {
+        let new = |seen: &mut u32| std::mem::replace(seen, v as u32) != v as u32;
         let (mut in_plane, mut in_space) = (0.0, 0.0);
         let ring = stars.around(v).iter().flat_map(|f| chart.triangles()[*f as usize]);
-        for f in ring.flat_map(|u| stars.around(u.index())).map(|f| *f as usize) {
-            if std::mem::replace(&mut seen[f], v as u32) != v as u32 {
+        for u in ring.filter(|u| new(&mut seen_corner[u.index()])) {
+            for f in stars.around(u.index()).iter().map(|f| *f as usize).filter(|f| new(&mut seen[*f])) {
                 in_plane += plane[f];
                 in_space += space[f];
             }

@@ -55,22 +55,23 @@ impl GridPoint {
         Self { x: (self.x + other.x) / 2, y: (self.y + other.y) / 2 }
     }
 
-    /// `self - origin`, as wide integers.
-    pub fn from_origin(self, origin: Self) -> WideVector {
-        WideVector { x: i128::from(self.x) - i128::from(origin.x), y: i128::from(self.y) - i128::from(origin.y) }
+    /// `self - origin`.
+    pub fn from_origin(self, origin: Self) -> GridVector {
+        GridVector { x: self.x - origin.x, y: self.y - origin.y }
     }
 }
 
-/// A vector of the parametric plane in grid units, wide enough for exact products.
+/// A vector of the parametric plane in grid units. Points saturate at 2^54, so that the vectors of a jacobian stay
+/// below 2^59, and their products below 2^118.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WideVector {
+pub struct GridVector {
     /// First component.
-    pub x: i128,
+    pub x: i64,
     /// Second component.
-    pub y: i128,
+    pub y: i64,
 }
 
-impl WideVector {
+impl GridVector {
     /// `self - other`.
     pub fn minus(self, other: Self) -> Self {
         Self { x: self.x - other.x, y: self.y - other.y }
@@ -78,15 +79,15 @@ impl WideVector {
 
     /// The exact determinant `self x other`.
     pub fn cross(self, other: Self) -> i128 {
-        self.x * other.y - self.y * other.x
+        i128::from(self.x) * i128::from(other.y) - i128::from(self.y) * i128::from(other.x)
     }
 }
 
 /// The middle Bezier point `2 m - (p + q) / 2` of the arc from `p` through `m` to `q`, relative to `origin`.
 /// Exact when `p` and `q` lie on the grid of vertices.
-pub fn bezier_control(p: GridPoint, m: GridPoint, q: GridPoint, origin: GridPoint) -> WideVector {
+pub fn bezier_control(p: GridPoint, m: GridPoint, q: GridPoint, origin: GridPoint) -> GridVector {
     let (p, m, q) = (p.from_origin(origin), m.from_origin(origin), q.from_origin(origin));
-    WideVector { x: 2 * m.x - (p.x + q.x) / 2, y: 2 * m.y - (p.y + q.y) / 2 }
+    GridVector { x: 2 * m.x - (p.x + q.x) / 2, y: 2 * m.y - (p.y + q.y) / 2 }
 }
 
 /// The exact orientation of the triangle `abc`: positive when it turns left. In grid units squared.

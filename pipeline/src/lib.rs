@@ -42,6 +42,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod buckets;
 pub mod id;
 pub mod space;
 mod union_find;
@@ -50,6 +51,7 @@ pub mod atlas;
 pub mod bernstein;
 pub mod closed;
 pub mod element;
+mod elimination;
 pub mod grid;
 mod jacobian;
 pub mod mesh;

@@ -14,7 +14,7 @@ use crate::boundary::Boundary;
 use crate::closed::ClosedChart;
 use crate::grid::{GridPoint, orientation};
 use crate::id::{EdgeId, FaceId, HalfEdgeId};
-use crate::sparse::{self, PRESCRIBED, Pattern};
+use crate::sparse::{self, Analysis, PRESCRIBED, Pattern};
 use crate::weights;
 
 /// After this many rounds of local changes, all negative edges are changed at once.
@@ -103,8 +103,11 @@ impl LinearMap {
 /// # Errors
 /// [`Error::Folded`] when the chart must be split; [`Error::Solver`].
 pub fn linear_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap, Error> {
+    let unknowns = Unknowns::new(chart, boundary);
+    let pattern = unknowns.pattern(chart);
+    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()? };
     let harmonic = weights::harmonic(chart);
-    let (places, mut folds) = attempt(chart, boundary, &harmonic)?;
+    let (places, mut folds) = attempt(&system, &harmonic)?;
     let count = folds.len();
     if count == 0 {
         return Ok(LinearMap { places, folded: 0, edges_changed: 0, method: Method::Harmonic });
@@ -119,7 +122,7 @@ pub fn linear_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap,
         let pick = |e: usize| if changed[e] { raised[e] } else { harmonic[e] };
         let mixed: Vec<f64> = (0..harmonic.len()).map(pick).collect();
         let places;
-        (places, folds) = attempt(chart, boundary, &mixed)?;
+        (places, folds) = attempt(&system, &mixed)?;
         if folds.is_empty() {
             let edges_changed = changed.iter().filter(|c| **c).count();
             return Ok(LinearMap { places, folded: count, edges_changed, method: Method::MMatrix });
@@ -131,16 +134,16 @@ pub fn linear_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap,
 
 /// The places by symmetric weights and the triangles folded there: all of them, where the matrix is not positive
 /// definite in doubles.
-fn attempt(chart: &ClosedChart, boundary: &Boundary, weights: &[f64]) -> Result<(Vec<GridPoint>, Vec<FaceId>), Error> {
-    match solve_symmetric(chart, boundary, weights) {
+fn attempt(system: &System, weights: &[f64]) -> Result<(Vec<GridPoint>, Vec<FaceId>), Error> {
+    match system.solve(weights) {
         Ok(places) => {
-            let folds = folded(chart, &places);
+            let folds = folded(system.chart, &places);
             Ok((places, folds))
         }
-        Err(Error::Solver(sparse::Error::Singular { .. })) => {
-            Ok((Vec::new(), (0..chart.triangles().len()).map(FaceId::at).collect()))
+        Err(sparse::Error::Singular { .. }) => {
+            Ok((Vec::new(), (0..system.chart.triangles().len()).map(FaceId::at).collect()))
         }
-        Err(error) => Err(error),
+        Err(error) => Err(error.into()),
     }
 }
 
@@ -162,7 +165,10 @@ pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary) -> Result<Linear
 /// # Errors
 /// [`Error::Solver`].
 pub fn harmonic_places(chart: &ClosedChart, boundary: &Boundary) -> Result<Vec<GridPoint>, Error> {
-    solve_symmetric(chart, boundary, &weights::harmonic(chart))
+    let unknowns = Unknowns::new(chart, boundary);
+    let pattern = unknowns.pattern(chart);
+    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()? };
+    Ok(system.solve(&weights::harmonic(chart))?)
 }
 
 /// The triangles that do not turn left, exactly.
@@ -188,7 +194,8 @@ fn grow(chart: &ClosedChart, harmonic: &[f64], folds: &[FaceId], everywhere: boo
     grown
 }
 
-/// The unknowns of a linear map: vertices that are not on the outer loop, and where those on it are.
+/// The unknowns of a linear map: vertices that are not on the outer loop, numbered in the order of elimination, and
+/// where those on it are.
 struct Unknowns {
     number: Vec<u32>,
     fixed: Vec<[f64; 2]>,
@@ -197,19 +204,19 @@ struct Unknowns {
 
 impl Unknowns {
     fn new(chart: &ClosedChart, boundary: &Boundary) -> Self {
-        let mut number = vec![0; chart.vertex_count()];
+        let mut number = vec![PRESCRIBED; chart.vertex_count()];
         let mut fixed = vec![[0.0; 2]; chart.vertex_count()];
         for (h, place) in chart.outer().iter().zip(boundary.vertices()) {
-            let v = chart.ends(*h)[0].index();
-            number[v] = PRESCRIBED;
-            fixed[v] = place.uv();
+            fixed[chart.ends(*h)[0].index()] = place.uv();
         }
-        let mut count = 0;
-        for n in number.iter_mut().filter(|n| **n != PRESCRIBED) {
-            *n = count;
-            count += 1;
-        }
-        Self { number, fixed, count: count as usize }
+        chart.elimination().iter().zip(0..).for_each(|(v, n)| number[v.index()] = n);
+        Self { number, fixed, count: chart.elimination().len() }
+    }
+
+    /// The pattern of one element per edge.
+    fn pattern(&self, chart: &ClosedChart) -> Pattern {
+        let element = |e: usize| edge_ends(chart, e).map(|v| self.number[v]);
+        Pattern::new(self.count, &(0..chart.edges().len()).map(element).collect::<Vec<_>>())
     }
 
     /// Adds `weight` times the places of prescribed neighbours to the right-hand side.
@@ -228,24 +235,34 @@ impl Unknowns {
     }
 }
 
-/// Solves for the places of the vertices with one weight per edge.
-fn solve_symmetric(chart: &ClosedChart, boundary: &Boundary, weights: &[f64]) -> Result<Vec<GridPoint>, Error> {
-    let unknowns = Unknowns::new(chart, boundary);
-    let ends = |e: usize| chart.ends(chart.edges().sides(EdgeId::at(e))[0]).map(|v| v.index());
-    let elements: Vec<[u32; 2]> = (0..weights.len()).map(|e| ends(e).map(|v| unknowns.number[v])).collect();
-    let pattern = Pattern::new(unknowns.count, &elements);
-    let mut values = pattern.zeros();
-    let mut rhs = vec![0.0; 2 * unknowns.count];
-    for (e, w) in weights.iter().enumerate() {
-        pattern.add(&mut values, e, &[[*w, -w], [-w, *w]]);
-        let [a, b] = ends(e);
-        unknowns.pull(&mut rhs, unknowns.number[a], b, *w);
-        unknowns.pull(&mut rhs, unknowns.number[b], a, *w);
+/// The system for the places of the vertices by one weight per edge, analysed once for all weights.
+struct System<'a> {
+    chart: &'a ClosedChart,
+    unknowns: &'a Unknowns,
+    analysis: Analysis<'a>,
+}
+
+impl System<'_> {
+    fn solve(&self, weights: &[f64]) -> Result<Vec<GridPoint>, sparse::Error> {
+        let Self { chart, unknowns, analysis } = self;
+        let mut values = analysis.pattern().zeros();
+        let mut rhs = vec![0.0; 2 * unknowns.count];
+        for (e, w) in weights.iter().enumerate() {
+            analysis.pattern().add(&mut values, e, &[[*w, -w], [-w, *w]]);
+            let [a, b] = edge_ends(chart, e);
+            unknowns.pull(&mut rhs, unknowns.number[a], b, *w);
+            unknowns.pull(&mut rhs, unknowns.number[b], a, *w);
+        }
+        if unknowns.count > 0 {
+            analysis.factorise(&values)?.solve(&mut rhs, 2);
+        }
+        Ok(unknowns.places(&rhs))
     }
-    if unknowns.count > 0 {
-        pattern.analyse()?.factorise(&values)?.solve(&mut rhs, 2);
-    }
-    Ok(unknowns.places(&rhs))
+}
+
+/// The vertices at both ends of an edge.
+fn edge_ends(chart: &ClosedChart, edge: usize) -> [usize; 2] {
+    chart.ends(chart.edges().sides(EdgeId::at(edge))[0]).map(|v| v.index())
 }
 
 /// Solves for the places of the vertices with weights that differ between the ends of an edge.

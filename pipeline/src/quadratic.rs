@@ -9,6 +9,7 @@ use crate::bernstein::{self, ExactDet, Validity};
 use crate::boundary::Boundary;
 use crate::closed::ClosedChart;
 use crate::element;
+use crate::elimination;
 use crate::grid::GridPoint;
 use crate::id::FaceId;
 use crate::jacobian::Corners;
@@ -61,9 +62,11 @@ pub fn quadratic_map(chart: &ClosedChart, boundary: &Boundary) -> Result<Quadrat
         }
     }
     let mut unknowns = 0;
-    for n in number.iter_mut().filter(|n| **n != PRESCRIBED) {
-        *n = unknowns;
-        unknowns += 1;
+    for node in elimination::of_nodes(chart) {
+        if number[node] != PRESCRIBED {
+            number[node] = unknowns;
+            unknowns += 1;
+        }
     }
     let solution = solve(chart, &number, &uv, unknowns as usize)?;
     for (node, n) in number.iter().enumerate().filter(|(_, n)| **n != PRESCRIBED) {
@@ -95,7 +98,7 @@ fn solve(chart: &ClosedChart, number: &[u32], uv: &[[f64; 2]], unknowns: usize) 
         }
     }
     if unknowns > 0 {
-        pattern.analyse()?.factorise(&values)?.solve(&mut rhs, 2);
+        pattern.analyse_as_numbered()?.factorise(&values)?.solve(&mut rhs, 2);
     }
     Ok(rhs)
 }

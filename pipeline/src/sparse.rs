@@ -1,12 +1,16 @@
 //! Sparse linear systems. The only file that names `faer`.
 //!
 //! Symmetric positive definite systems are assembled from small dense element matrices into the lower triangle
-//! (compressed columns) and solved by a supernodal Cholesky factorisation (minimum degree order; one thread, as
-//! faer's threaded solve costs several times the work). General systems are solved by LU.
+//! (compressed columns) and solved by a supernodal Cholesky factorisation (one thread, as faer's threaded solve costs
+//! several times the work). Unknowns are eliminated in an order of minimum degree (AMD: Amestoy, Davis and Duff 1996,
+//! doi 10.1137/S0895479894278952), or as they are numbered. General systems are solved by LU.
 
+use crate::buckets::Buckets;
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::perm::PermRef;
 use faer::prelude::Solve;
 use faer::reborrow::Reborrow;
+use faer::sparse::linalg::amd;
 use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMat, SparseColMatRef, SymbolicSparseColMatRef, Triplet};
@@ -47,38 +51,21 @@ pub struct Pattern {
 impl Pattern {
     /// The pattern for elements that join the given unknowns ([`PRESCRIBED`] ones are left out).
     pub fn new<const N: usize>(unknowns: usize, elements: &[[u32; N]]) -> Self {
-        let mut heads = vec![0_u32; unknowns + 1];
-        for (row, column) in elements.iter().flat_map(entries) {
-            if row != PRESCRIBED {
-                heads[column as usize + 1] += 1;
-            }
-        }
-        (0..unknowns).for_each(|j| heads[j + 1] += heads[j]);
-        let mut filled = vec![0_u32; heads[unknowns] as usize];
-        let mut next = heads.clone();
-        for (row, column) in elements.iter().flat_map(entries) {
-            if row != PRESCRIBED {
-                filled[next[column as usize] as usize] = row;
-                next[column as usize] += 1;
-            }
-        }
-        let mut pattern = Self { unknowns, starts: vec![0], rows: Vec::new(), slots: Vec::new() };
+        let all = || elements.iter().flat_map(entries);
+        let of_columns = || all().zip(0_u32..).filter(|(e, _)| e.0 != PRESCRIBED);
+        let mut columns = Buckets::new(unknowns, || of_columns().map(|((row, column), i)| (column, (row, i))));
+        let slots = vec![PRESCRIBED; elements.len() * N * (N + 1) / 2];
+        let mut pattern = Self { unknowns, starts: vec![0], rows: Vec::new(), slots };
         for j in 0..unknowns {
-            let column = &mut filled[heads[j] as usize..heads[j + 1] as usize];
+            let column = columns.get_mut(j);
             column.sort_unstable();
-            pattern.rows.extend(column.chunk_by(|a, b| a == b).map(|run| run[0]));
+            for run in column.chunk_by(|a, b| a.0 == b.0) {
+                run.iter().for_each(|(_, i)| pattern.slots[*i as usize] = pattern.rows.len() as u32);
+                pattern.rows.push(run[0].0);
+            }
             pattern.starts.push(pattern.rows.len() as u32);
         }
-        pattern.slots = elements.iter().flat_map(entries).map(|e| pattern.slot(e)).collect();
         pattern
-    }
-
-    fn slot(&self, (row, column): (u32, u32)) -> u32 {
-        if row == PRESCRIBED {
-            return PRESCRIBED;
-        }
-        let (start, end) = (self.starts[column as usize] as usize, self.starts[column as usize + 1] as usize);
-        (start + self.rows[start..end].partition_point(|r| *r < row)) as u32
     }
 
     /// A matrix of zeros.
@@ -103,16 +90,41 @@ impl Pattern {
         self.starts[..self.unknowns].iter().map(|s| *s as usize)
     }
 
-    /// Orders and analyses the matrix; the result serves every matrix of this pattern.
+    /// Analyses the matrix for elimination in an order of minimum degree; the result serves every matrix of this
+    /// pattern.
     ///
     /// # Errors
     /// [`Error::TooLarge`].
     pub fn analyse(&self) -> Result<Analysis<'_>, Error> {
-        let symbolic =
-            factorize_symbolic_cholesky(self.view(), Side::Lower, SymmetricOrdering::Amd, Default::default());
+        self.analyse_in(SymmetricOrdering::Amd)
+    }
+
+    /// As [`Self::analyse`], for unknowns that are numbered in the order in which to eliminate them.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`].
+    pub fn analyse_as_numbered(&self) -> Result<Analysis<'_>, Error> {
+        // Not `SymmetricOrdering::Identity`, which takes the triangle below the diagonal for the one above it.
+        let identity: Vec<u32> = (0..self.unknowns as u32).collect();
+        self.analyse_in(SymmetricOrdering::Custom(PermRef::new_checked(&identity, &identity, self.unknowns)))
+    }
+
+    fn analyse_in(&self, order: SymmetricOrdering<u32>) -> Result<Analysis<'_>, Error> {
+        let symbolic = factorize_symbolic_cholesky(self.view(), Side::Lower, order, Default::default());
         let fits = |s: &SymbolicCholesky<u32>| s.len_val() <= LARGEST_FACTOR / size_of::<f64>();
         let symbolic = symbolic.ok().filter(fits).ok_or(Error::TooLarge { unknowns: self.unknowns })?;
         Ok(Analysis { pattern: self, symbolic })
+    }
+
+    /// The unknowns in an order of minimum degree; as they are numbered, where memory is short.
+    pub fn minimum_degree(&self) -> Vec<u32> {
+        let as_numbered = || (0..self.unknowns as u32).collect();
+        let (mut order, mut places): (Vec<u32>, Vec<u32>) = (as_numbered(), as_numbered());
+        let scratch = amd::order_maybe_unsorted_scratch::<u32>(self.unknowns, self.rows.len());
+        let Ok(mut memory) = MemBuffer::try_new(scratch) else { return order };
+        let stack = MemStack::new(&mut memory);
+        let ordered = amd::order_maybe_unsorted(&mut order, &mut places, self.view(), Default::default(), stack);
+        if ordered.is_ok() { order } else { as_numbered() }
     }
 
     fn view(&self) -> SymbolicSparseColMatRef<'_, u32> {
@@ -136,6 +148,16 @@ pub struct Analysis<'a> {
 }
 
 impl Analysis<'_> {
+    /// What was analysed.
+    pub fn pattern(&self) -> &Pattern {
+        self.pattern
+    }
+
+    /// How many numbers a factor holds.
+    pub fn factor_entries(&self) -> usize {
+        self.symbolic.len_val()
+    }
+
     /// Factorises the matrix with these `values`.
     ///
     /// # Errors

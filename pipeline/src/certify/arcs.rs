@@ -1,7 +1,7 @@
 //! Premises (c) and (d): loops of quadratic arcs that are star-shaped about a point.
 
 use super::incidence::ArcNodes;
-use crate::grid::{GridPoint, bezier_control};
+use crate::grid::{GridPoint, GridVector, bezier_control};
 
 /// A quadratic arc of the boundary: first end, middle node, second end. The ends lie on the grid of vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +20,7 @@ impl Arc {
         let c = bezier_control(self.from, self.mid, self.to, self.from);
         let (p, q) = (self.from.from_origin(centre), self.to.from_origin(centre));
         // The control point is found relative to the first end, where halving is exact, and then moved.
-        let control = crate::grid::WideVector { x: c.x + p.x, y: c.y + p.y };
+        let control = GridVector { x: c.x + p.x, y: c.y + p.y };
         [p.cross(control), p.cross(q), control.cross(q)]
     }
 }

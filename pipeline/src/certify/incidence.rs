@@ -1,5 +1,6 @@
 //! Premise (a): which triangles meet where, from the cells alone.
 
+use crate::buckets::Buckets;
 use crate::id::FaceId;
 
 /// An arc of the boundary by its nodes: first vertex, middle, second vertex, with its triangle on the left.
@@ -46,6 +47,7 @@ pub enum IncidenceError {
 }
 
 /// A directed side of a cell: ends in ascending order, then whether it runs that way, its middle, its cell.
+#[derive(Clone, Copy, Default)]
 struct Side {
     ends: [u32; 2],
     forward: bool,
@@ -59,8 +61,7 @@ pub(super) fn boundary_loops(cells: &[[u32; 6]], nodes: usize) -> Result<Vec<Vec
         return Err(IncidenceError::Empty);
     }
     check_nodes(cells, nodes)?;
-    let mut sides = all_sides(cells);
-    sides.sort_unstable_by_key(|s| (s.ends, s.mid, s.forward, s.cell));
+    let sides = all_sides(cells, nodes);
     let mut out: Vec<Option<[u32; 2]>> = vec![None; nodes];
     let mut middle_of: Vec<Option<[u32; 2]>> = vec![None; nodes];
     for edge in sides.chunk_by(|a, b| a.ends == b.ends) {
@@ -106,12 +107,21 @@ fn check_roles(cells: &[[u32; 6]], middle_of: &[Option<[u32; 2]>]) -> Result<(),
     Ok(())
 }
 
-fn all_sides(cells: &[[u32; 6]]) -> Vec<Side> {
-    let side = |i: usize, cell: &[u32; 6], k: usize| {
+/// The sides of all cells, sorted: by their ends, their middle, their direction, their cell.
+fn all_sides(cells: &[[u32; 6]], nodes: usize) -> Vec<Side> {
+    let side = |i: u32, cell: &[u32; 6], k: usize| {
         let (a, b) = (cell[k], cell[(k + 1) % 3]);
-        Side { ends: [a.min(b), a.max(b)], forward: a < b, mid: cell[3 + k], cell: i as u32 }
+        (a.min(b), Side { ends: [a.min(b), a.max(b)], forward: a < b, mid: cell[3 + k], cell: i })
     };
-    cells.iter().enumerate().flat_map(|(i, c)| (0..3).map(move |k| side(i, c, k))).collect()
+    let unsorted = || (0..).zip(cells).flat_map(|(i, c)| [0, 1, 2].map(|k| side(i, c, k)));
+    let mut at_lower_end = Buckets::new(nodes, unsorted);
+    let mut sides = Vec::with_capacity(3 * cells.len());
+    for node in 0..nodes {
+        let around = at_lower_end.get_mut(node);
+        around.sort_unstable_by_key(|s| (s.ends[1], s.mid, s.forward, s.cell));
+        sides.extend_from_slice(around);
+    }
+    sides
 }
 
 /// Strings the boundary arcs together. Each vertex has at most one arc out; the boundary of oriented triangles

@@ -1,6 +1,7 @@
 //! Which triangles meet along which edge. The table never sees positions, and takes any triangulation:
 //! non-manifold and inconsistently oriented ones too.
 
+use crate::buckets::Buckets;
 use crate::id::{EdgeId, FaceId, HalfEdgeId, VertexId};
 
 /// The edges of a triangulation, each with the half-edges that run along it in either direction.
@@ -14,36 +15,37 @@ pub struct EdgeTable {
 }
 
 impl EdgeTable {
-    /// Finds the edges of `triangles`, whose corners are distinct. Costs one sort of the half-edges.
+    /// Finds the edges of `triangles`, whose corners are distinct.
     pub fn new(triangles: &[[VertexId; 3]]) -> Self {
-        let mut keyed: Vec<(u64, u32)> = Vec::with_capacity(3 * triangles.len());
-        for t in triangles {
-            for k in 0..3 {
-                let (a, b) = (t[k].0, t[(k + 1) % 3].0);
-                keyed.push((u64::from(a.min(b)) << 32 | u64::from(a.max(b)), keyed.len() as u32));
+        let ends = |t: &[VertexId; 3]| [0, 1, 2].map(|k| (t[k].0.min(t[(k + 1) % 3].0), t[k].0.max(t[(k + 1) % 3].0)));
+        let half_edges = || triangles.iter().flat_map(ends).zip(0_u32..).map(|((low, high), h)| (low, (high, h)));
+        let vertices = triangles.iter().flatten().map(|v| v.index() + 1).max().unwrap_or(0);
+        let mut at_lower_end = Buckets::new(vertices, half_edges);
+        let mut sides: Vec<u32> = Vec::with_capacity(3 * triangles.len());
+        let mut group_of = vec![0_u32; 3 * triangles.len()];
+        let mut groups: Vec<(u32, u32)> = Vec::new();
+        for v in 0..vertices {
+            let around = at_lower_end.get_mut(v);
+            around.sort_unstable();
+            for chunk in around.chunk_by(|a, b| a.0 == b.0) {
+                chunk.iter().for_each(|&(_, h)| group_of[h as usize] = groups.len() as u32);
+                groups.push((sides.len() as u32, (sides.len() + chunk.len()) as u32));
+                sides.extend(chunk.iter().map(|(_, h)| *h));
             }
         }
-        keyed.sort_unstable();
-        let mut group_of = vec![0_u32; keyed.len()];
-        let mut groups: Vec<(u32, u32)> = Vec::new();
-        for chunk in keyed.chunk_by(|a, b| a.0 == b.0) {
-            let start = groups.last().map_or(0, |g| g.1);
-            chunk.iter().for_each(|&(_, h)| group_of[h as usize] = groups.len() as u32);
-            groups.push((start, start + chunk.len() as u32));
-        }
-        Self::numbered(&keyed, &group_of, &groups)
+        Self::numbered(&sides, &group_of, &groups)
     }
 
     /// Numbers the groups of equal edges by their first half-edge.
-    fn numbered(keyed: &[(u64, u32)], group_of: &[u32], groups: &[(u32, u32)]) -> Self {
+    fn numbered(sides: &[u32], group_of: &[u32], groups: &[(u32, u32)]) -> Self {
         let unseen = EdgeId(u32::MAX);
         let mut number = vec![unseen; groups.len()];
-        let mut table = Self { edge_of: Vec::with_capacity(keyed.len()), starts: vec![0], sides: Vec::new() };
+        let mut table = Self { edge_of: Vec::with_capacity(sides.len()), starts: vec![0], sides: Vec::new() };
         for &group in group_of {
             let (start, end) = groups[group as usize];
             if number[group as usize] == unseen {
                 number[group as usize] = EdgeId::at(table.starts.len() - 1);
-                table.sides.extend(keyed[start as usize..end as usize].iter().map(|k| HalfEdgeId(k.1)));
+                table.sides.extend(sides[start as usize..end as usize].iter().map(|h| HalfEdgeId(*h)));
                 table.starts.push(table.sides.len() as u32);
             }
             table.edge_of.push(number[group as usize]);

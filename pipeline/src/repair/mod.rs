@@ -131,9 +131,13 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     edges = renewed(edges, report.duplicate_triangles.count > 0, &draft.triangles);
     draft.close_cracks(&edges, settings.weld, &mut report);
     edges = renewed(edges, report.cracks_closed > 0, &draft.triangles);
-    report.flipped_triangles = draft.orient(&edges);
-    edges = renewed(edges, report.flipped_triangles.count > 0, &draft.triangles);
-    Ok(Repaired { mesh: draft.into_mesh(edges, &mut report), raw, report })
+    let as_counted = report.duplicate_triangles.count == 0 && report.cracks_closed == 0;
+    if !as_counted || raw.inconsistent_edges > 0 {
+        report.flipped_triangles = draft.orient(&edges);
+        edges = renewed(edges, report.flipped_triangles.count > 0, &draft.triangles);
+    }
+    let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0);
+    Ok(Repaired { mesh: draft.into_mesh(edges, known, &mut report), raw, report })
 }
 
 /// The edges of `triangles`: found again only where the triangles `changed`.
@@ -211,8 +215,9 @@ impl Draft {
         flipped
     }
 
-    /// Gives every umbrella a vertex of its own, drops unused points, and measures.
-    fn into_mesh(self, edges: EdgeTable, report: &mut Report) -> SurfaceMesh {
+    /// Gives every umbrella a vertex of its own, drops unused points, and measures. The triangles may have been counted
+    /// before.
+    fn into_mesh(self, edges: EdgeTable, known: Option<&Census>, report: &mut Report) -> SurfaceMesh {
         let umbrellas = Umbrellas::new(&self.triangles, &edges);
         let (of_umbrella, welded) = split_vertices(&umbrellas.vertices(&self.triangles), report);
         let renamed = |face: usize| [0, 1, 2].map(|k| of_umbrella[umbrellas.of_corner[3 * face + k] as usize]);
@@ -228,7 +233,9 @@ impl Draft {
         let nonmanifold_edges = edges.iter().filter(|(_, sides)| sides.len() > 2).count();
         let edges = renewed(edges, report.split_vertices.count > 0, &triangles);
         let nonmanifold_vertices = pinned_vertices(&welded, &triangles, &edges);
-        let census = Census { nonmanifold_edges, nonmanifold_vertices, ..Census::new(&triangles, &edges) };
+        let known = known.filter(|_| report.split_vertices.count == 0).cloned();
+        let census = known.unwrap_or_else(|| Census::new(&triangles, &edges));
+        let census = Census { nonmanifold_edges, nonmanifold_vertices, ..census };
         let added_from = points.len();
         SurfaceMesh { points, triangles, source: self.source, welded, added_from, edges, census, metric }
     }

@@ -18,17 +18,22 @@ const ROUNDS: u32 = 16;
 /// # Errors
 /// [`Error::NoNormal`], after a fixed number of rounds.
 pub(super) fn separate(points: &mut [Vec3], charts: &[LinearChart], diagonal: f64) -> Result<usize, Error> {
-    let mut moved_in = vec![0; if flat(points, charts).is_empty() { 0 } else { points.len() }];
+    let mut found = flat(points, charts);
+    let mut moved_in = vec![0; if found.is_empty() { 0 } else { points.len() }];
     for round in 1..=ROUNDS {
+        if found.is_empty() {
+            break;
+        }
         let step = f64::from(round) * STEP * diagonal;
-        for (_, triangle) in flat(points, charts) {
+        for (_, triangle) in found {
             if triangle.iter().all(|n| moved_in[*n as usize] != round) {
                 let node = shift(points, triangle, step);
                 moved_in[node as usize] = round;
             }
         }
+        found = flat(points, charts);
     }
-    match flat(points, charts).first() {
+    match found.first() {
         Some(((chart, face), _)) => Err(Error::NoNormal { chart: *chart, face: *face }),
         None => Ok(moved_in.iter().filter(|round| **round > 0).count()),
     }
