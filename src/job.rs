@@ -12,7 +12,7 @@ use pipeline::distortion::{self, CellFields};
 use pipeline::mesh::{SurfaceMesh, TriangleSoup};
 use pipeline::repair::Repaired;
 use pipeline::seams::SeamNetwork;
-use pipeline::{CertifiedChart, MapError, SplitError, decompose, finish_chart, map_or_split, repair};
+use pipeline::{CertifiedChart, MapError, SplitError, decompose, finish_or_split, map_or_split, repair};
 use rustix::time::{ClockId, clock_gettime};
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -311,8 +311,11 @@ fn map_and_write(
         let mapped = map_or_split(mesh, chart, settings.order, &settings.decompose()).map_err(|e| map_refusal(&e))?;
         clock.next(report, Stage::Untangle);
         for (chart, mapped) in mapped {
-            charts.push(chart);
-            done.push(finish_chart(mapped));
+            let finished = finish_or_split(mesh, chart, mapped, settings.order, &settings.decompose());
+            for (chart, certified) in finished.map_err(|e| map_refusal(&e))? {
+                charts.push(chart);
+                done.push(certified);
+            }
         }
     }
     clock.next(report, Stage::Write);

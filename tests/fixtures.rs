@@ -14,7 +14,7 @@ type Fixture = (&'static str, usize, usize, Option<u64>, std::ops::RangeInclusiv
 pub const ALL: [Fixture; 13] = [
     ("disk.stl", 1, 1, Some(0), 1..=1),
     ("disk_with_holes.stl", 1, 4, Some(0), 1..=1),
-    ("bent_disk.stl", 1, 1, Some(0), 1..=1),
+    ("bent_disk.stl", 1, 1, Some(0), 1..=2),
     ("floater_five.obj", 1, 1, Some(0), 1..=1),
     ("folding_three.obj", 1, 1, Some(0), 1..=1),
     ("folding_six.obj", 1, 1, Some(0), 1..=1),
@@ -54,9 +54,8 @@ fn every_fixture_ends_as_it_should_and_is_proven_again() {
         for chart in &report.charts {
             let other = |c: &u32| report.charts[*c as usize].colour != chart.colour;
             assert!(chart.neighbours.iter().all(other), "{name}: neighbours differ in colour");
-            // Three in a hundred triangles of the bent disk are invalid: untangling them changes its ratio by more.
-            let bound = if name == "bent_disk.stl" { 1.1e6 } else { 1e6 };
-            assert!(chart.distortion.area_ratio <= bound, "{name}: {:?}", chart.distortion);
+            let within = chart.distortion.area_ratio <= 1e6 || chart.triangles == 1;
+            assert!(within, "{name}: {:?}", chart.distortion);
         }
     }
 }
@@ -64,9 +63,11 @@ fn every_fixture_ends_as_it_should_and_is_proven_again() {
 #[test]
 fn the_bent_disk_has_hundreds_of_invalid_triangles_and_ends_close_to_harmonic() {
     let out = Out::new();
-    assert_eq!(out.run(&[&fixture("bent_disk.stl")], &["--feature-angle", "off"]).code, Some(0));
+    // Its area ratio is just above the default bound: this keeps it whole.
+    let whole = ["--feature-angle", "off", "--max-area-ratio", "1e7"];
+    assert_eq!(out.run(&[&fixture("bent_disk.stl")], &whole).code, Some(0));
     let report = out.report("bent_disk.stl");
-    let chart = &report.charts[0];
+    let [chart] = &report.charts[..] else { panic!("{} charts", report.charts.len()) };
     assert!(chart.quadratic.as_ref().is_some_and(|q| q.invalid > 150 && q.det_min < 0.0), "{chart:?}");
     let untangle = chart.untangle.as_ref().expect("untangled");
     assert!(

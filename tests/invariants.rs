@@ -1,17 +1,31 @@
 //! What must not depend on how a surface is given: every fixture, scaled, turned and shuffled.
 
 use crate::fixtures::{ALL, generate};
+use pipeline::atlas::Chart;
 use pipeline::mesh::TriangleSoup;
-use pipeline::{CertifiedChart, Order, decompose, finish_chart, map_or_split, repair};
+use pipeline::{CertifiedChart, Order, decompose, distortion, finish_or_split, map_or_split, repair};
 use planish::formats::{self, Kind};
+
+/// The largest area ratio: enough for the bent disk to stay whole, so that its energies can be compared.
+const MAX_AREA_RATIO: f64 = 1e7;
 
 /// The certified charts of a soup.
 fn charts(soup: &TriangleSoup) -> Vec<CertifiedChart> {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-    let settings = decompose::Settings { feature_angle: None, ..Default::default() };
+    let settings = decompose::Settings { max_area_ratio: MAX_AREA_RATIO, feature_angle: None, ..Default::default() };
     let atlas = decompose(&mesh, &settings).expect("an atlas");
     let parts = |chart| map_or_split(&mesh, chart, Order::Quadratic, &settings).expect("maps");
-    atlas.into_charts().into_iter().flat_map(parts).map(|(_, mapped)| finish_chart(mapped)).collect()
+    let finished = |(chart, mapped)| {
+        finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings).expect("maps").into_iter().map(within_bound)
+    };
+    atlas.into_charts().into_iter().flat_map(parts).flat_map(finished).collect()
+}
+
+/// The map of a chart, which keeps what the settings promise.
+fn within_bound((chart, done): (Chart, CertifiedChart)) -> CertifiedChart {
+    let ratio = distortion::area_ratio(&chart, &done.certified);
+    assert!(ratio <= MAX_AREA_RATIO || chart.triangles().len() == 1, "{ratio}");
+    done
 }
 
 fn moved(soup: &TriangleSoup, f: impl Fn([f64; 3]) -> [f64; 3]) -> TriangleSoup {

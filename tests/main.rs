@@ -2,6 +2,7 @@
 
 mod check;
 mod corpus;
+mod every_mesh;
 mod fixtures;
 mod interop;
 mod invariants;

@@ -88,7 +88,7 @@ pub fn map_chart(chart: &Chart, order: Order) -> Result<MappedChart, MapError> {
     map_within(chart, order, f64::INFINITY)
 }
 
-/// As [`map_chart`], where the area ratio of neither map may exceed `max_area_ratio`.
+/// As [`map_chart`], where a chart whose certified map would exceed `max_area_ratio` need not be mapped.
 ///
 /// # Errors
 /// [`MapError`]: the chart must be split.
@@ -101,30 +101,27 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64) -> Result<Ma
     let start = linear.raised(&closed, &boundary);
     let centres = (0..closed.loops().len()).map(|k| start[closed.centre_node(k)]).collect();
     let certified_start = prove(planar(&closed, &start, centres)).map_err(MapError::Start)?;
-    let within = |ratio: &dyn Fn() -> f64| {
-        let ratio = if max_area_ratio.is_finite() { ratio() } else { 1.0 };
+    let ratio = distortion::area_ratio(chart, &certified_start);
+    let within = |ratio: f64, bound: f64| {
         let stretched = || MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) };
-        if ratio > max_area_ratio { Err(stretched()) } else { Ok(()) }
+        if ratio > bound { Err(stretched()) } else { Ok(()) }
     };
-    within(&|| distortion::area_ratio(chart, &certified_start))?;
+    within(ratio, if order == Order::Linear { max_area_ratio } else { HOPELESS * max_area_ratio })?;
     let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary));
-    if let Some(Ok(map)) = &harmonic
-        && map.invalid().len() <= chart.triangles().len() / FEW_INVALID
-    {
-        within(&|| distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n])))?;
+    if let Some(Ok(map)) = &harmonic {
+        let of_harmonic = distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n]));
+        within(ratio.sqrt() * of_harmonic.sqrt(), max_area_ratio)?;
     }
     Ok(MappedChart { closed, linear, start, certified_start, harmonic })
 }
 
-/// The harmonic map's own ratio is looked at where at most one in so many triangles is invalid: areas of many invalid
-/// ones say nothing.
-const FEW_INVALID: usize = 100;
+/// A chart whose linear map is above the largest area ratio by this factor is split at once. Below it the harmonic map
+/// is asked, too, as slivers stretch linear maps more: a ratio is foretold, halfway between those of both. That is
+/// right within a decade mostly, and saves untangling; what decides is the certified map.
+const HOPELESS: f64 = 10.0;
 
-/// Maps may reach this share of the largest area ratio: untangling changes it a little.
-const MARGIN: f64 = 0.8;
-
-/// Maps `chart`, a part of `mesh`, and splits it where it cannot be mapped, or is more distorted than `settings` allow,
-/// until every part can. Ends because parts are smaller, and single triangles map.
+/// Maps `chart`, a part of `mesh`, and splits it where it cannot be mapped, or would be more distorted than `settings`
+/// allow, until every part can. Ends because parts are smaller, and single triangles map.
 ///
 /// # Errors
 /// [`SplitError`].
@@ -137,7 +134,7 @@ pub fn map_or_split(
     let mut mapped = Vec::new();
     let mut waiting = vec![chart];
     while let Some(chart) = waiting.pop() {
-        let error = match map_within(&chart, order, MARGIN * settings.max_area_ratio) {
+        let error = match map_within(&chart, order, settings.max_area_ratio) {
             Ok(map) => {
                 mapped.push((chart, map));
                 continue;
@@ -197,8 +194,73 @@ pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
     CertifiedChart { certified, start: certified_start, linear, harmonic, untangle, unsolved: None }
 }
 
+/// As [`finish_chart`], where `chart`, a part of `mesh`, is split and mapped again if its certified map is more distorted
+/// than `settings` allow: untangling changes areas. Ends because parts are smaller; a single triangle's map is what it
+/// is.
+///
+/// # Errors
+/// [`SplitError`].
+pub fn finish_or_split(
+    mesh: &SurfaceMesh,
+    chart: Chart,
+    mapped: MappedChart,
+    order: Order,
+    settings: &decompose::Settings,
+) -> Result<Vec<(Chart, CertifiedChart)>, SplitError> {
+    let mut finished = Vec::new();
+    let mut waiting = vec![(chart, mapped)];
+    while let Some((chart, mapped)) = waiting.pop() {
+        let done = finish_chart(mapped);
+        match split_if_stretched(mesh, &chart, &done.certified, settings)? {
+            None => finished.push((chart, done)),
+            Some(parts) => {
+                for part in parts.into_iter().rev() {
+                    waiting.extend(map_or_split(mesh, part, order, settings)?.into_iter().rev());
+                }
+            }
+        }
+    }
+    Ok(finished)
+}
+
+/// The parts of a chart whose map is above the largest area ratio, unless it is a single triangle.
+fn split_if_stretched(
+    mesh: &SurfaceMesh,
+    chart: &Chart,
+    map: &CertifiedMap,
+    settings: &decompose::Settings,
+) -> Result<Option<Vec<Chart>>, decompose::Error> {
+    if distortion::area_ratio(chart, map) <= settings.max_area_ratio {
+        return Ok(None);
+    }
+    decompose::split(mesh, chart, Some(&distortion::log_scales(chart, map)), settings)
+}
+
 /// The part of a map that is published: the chart without its fans.
 fn planar(closed: &ClosedChart, nodes: &[GridPoint], hole_centres: Vec<GridPoint>) -> PlanarMap {
     let cells = (0..closed.own_triangles()).map(|f| closed.nodes(f).map(|n| n as u32)).collect();
     PlanarMap { cells, nodes: nodes[..closed.own_nodes()].to_vec(), hole_centres }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{repair, shapes};
+
+    #[test]
+    fn what_untangling_stretches_too_much_is_split() {
+        let mesh = repair(&shapes::bent_disk(32, 0.45, 1.0), &Default::default()).expect("a surface").mesh;
+        let settings = decompose::Settings { max_area_ratio: 5e5, feature_angle: None, ..Default::default() };
+        let disk =
+            decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk").into_charts().remove(0);
+        let parts = map_or_split(&mesh, disk, Order::Quadratic, &settings).expect("maps");
+        let [(chart, mapped)] = &parts[..] else { panic!("{} parts", parts.len()) };
+        let ratio = |(chart, done): &(Chart, CertifiedChart)| distortion::area_ratio(chart, &done.certified);
+        let whole = (chart.clone(), finish_chart(mapped.clone()));
+        assert!(ratio(&whole) > settings.max_area_ratio, "neither linear nor harmonic map foretell it");
+        let finished =
+            finish_or_split(&mesh, chart.clone(), mapped.clone(), Order::Quadratic, &settings).expect("maps");
+        assert!(finished.len() > 1 && finished.iter().all(|f| ratio(f) <= settings.max_area_ratio));
+        assert_eq!(finished.iter().map(|f| f.0.triangles().len()).sum::<usize>(), mesh.triangles().len());
+    }
 }

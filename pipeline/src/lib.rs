@@ -7,7 +7,8 @@
 //! 3. [`map_chart`] makes the [`linear`] map, which does not fold, and the harmonic [`quadratic`] map, whose curved
 //!    triangles may be invalid.
 //! 4. [`finish_chart`] makes them valid ([`mod@untangle`]) while keeping the Dirichlet energy as low as it can be, and
-//!    proves the result one-to-one ([`certify`]).
+//!    proves the result one-to-one ([`certify`]). Charts whose maps stretch too much are split, before it
+//!    ([`map_or_split`]) or, where only the result shows it, after it ([`finish_or_split`]).
 //! 5. [`distortion`] measures what came out; [`seams`] finds the curves between charts.
 //! 6. [`mod@subdivide`] makes linear triangulations of certified maps, for meshers.
 //!
@@ -73,8 +74,8 @@ pub mod subdivide;
 pub mod untangle;
 
 pub use chart_map::{
-    CertifiedChart, Harmonic, MapError, MappedChart, Order, SplitError, finish_chart, map_chart, map_or_split,
-    map_within,
+    CertifiedChart, Harmonic, MapError, MappedChart, Order, SplitError, finish_chart, finish_or_split, map_chart,
+    map_or_split, map_within,
 };
 pub use decompose::decompose;
 pub use repair::repair;

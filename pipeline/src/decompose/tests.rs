@@ -1,7 +1,7 @@
 use super::*;
 use crate::id::VertexId;
 use crate::mesh::TriangleSoup;
-use crate::{Order, finish_chart, map_or_split, repair, shapes};
+use crate::{Order, finish_chart, finish_or_split, map_or_split, repair, shapes};
 
 fn surface(soup: &TriangleSoup) -> SurfaceMesh {
     repair(soup, &Default::default()).expect("a surface is left").mesh
@@ -128,8 +128,9 @@ fn what_stretches_too_much_is_split_until_it_does_not() {
         let parts = map_or_split(&mesh, chart, Order::Quadratic, &settings).expect("maps");
         assert!(parts.len() > 2, "{}", parts.len());
         assert_eq!(parts.iter().map(|(c, _)| c.triangles().len()).sum::<usize>(), mesh.triangles().len());
-        for (chart, mapped) in parts {
-            let done = finish_chart(mapped);
+        let finish =
+            |(chart, mapped)| finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings).expect("maps");
+        for (chart, done) in parts.into_iter().flat_map(finish) {
             let ratio = crate::distortion::area_ratio(&chart, &done.certified);
             assert!(ratio <= max_area_ratio, "{ratio} > {max_area_ratio}");
         }
