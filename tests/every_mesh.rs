@@ -3,7 +3,7 @@
 //! the order, and this is quick. See [`crate::corpus`] for the files themselves.
 
 use crate::corpus::{manifest, shared};
-use crate::legality::{assert_legal, assert_meets_itself};
+use crate::legality::assert_legal;
 use crate::support::Out;
 use planish::formats::{Kind, kind};
 use planish::outcome::{Code, Status};
@@ -32,9 +32,6 @@ impl Promise {
         }
     }
 }
-
-/// Not legal yet: where three or more sheets meet, charts of these files meet themselves.
-const MEETING_THEMSELVES: [&str; 1] = ["truck_nonmanifold.obj"];
 
 /// The folders of real files, and how many of each planish reads at least.
 const FOLDERS: [(&str, usize); 3] = [("meshes", 25), ("anchors/stl", 12), ("malformed", 9)];
@@ -89,11 +86,7 @@ fn assert_kept(what: &str, promise: Promise, report: &Report, folder: &Path) {
         (Status::Certified, None) => {
             assert_ne!(promise, Promise::Reject, "{what}: was certified");
             assert!(report.refused_components.is_empty(), "{what}: {:?}", report.refused_components);
-            if MEETING_THEMSELVES.iter().any(|name| folder.ends_with(name)) {
-                assert_meets_itself(folder);
-            } else {
-                assert_legal(folder);
-            }
+            assert_legal(folder);
             for chart in &report.charts {
                 let within = chart.distortion.area_ratio <= report.settings.max_area_ratio || chart.triangles == 1;
                 assert!(within, "{what}: {chart:?}");

@@ -289,14 +289,6 @@ pub fn assert_legal(folder: &Path) {
     assert!(flaws.is_empty(), "{}: {} flaws: {:?}", folder.display(), flaws.len(), &flaws[..flaws.len().min(5)]);
 }
 
-/// The only flaw of a certified result is that charts meet themselves, and there it is.
-pub fn assert_meets_itself(folder: &Path) {
-    let flaws = flaws_of_result(folder);
-    let other = flaws.iter().find(|f| !matches!(f, Flaw::MeetsItself { .. }));
-    assert!(other.is_none(), "{}: {other:?}", folder.display());
-    assert!(!flaws.is_empty(), "{}: is legal now: expect that", folder.display());
-}
-
 /// What is wrong with the charts of a certified result, which are the surface.
 fn flaws_of_result(folder: &Path) -> Vec<Flaw> {
     let read =

@@ -25,8 +25,8 @@ pub(super) struct HalfArc {
     pub next: u32,
     /// The other side, or [`NONE`] where the surface ends.
     pub twin: u32,
-    /// The cell on the other side of an edge where orientations disagree, else [`NONE`].
-    pub foe: u32,
+    /// The cells that lie beyond without being joined (see [`Dual::foes`]), ascending.
+    pub foes: Vec<u32>,
     pub length: f64,
     /// The length that is a feature, and that weighed by its sharpness.
     pub feature: f64,
@@ -129,10 +129,11 @@ impl<'a> Tracer<'a> {
         self.of[h.face().index()]
     }
 
-    /// The cell on the other side of an edge where orientations disagree.
-    fn foe(&self, h: HalfEdgeId) -> u32 {
-        let twin = self.dual.mesh.edges().twin(h).filter(|_| self.dual.across(h).is_none());
-        twin.map_or(NONE, |t| self.cell(t))
+    fn foes(&self, h: HalfEdgeId) -> Vec<u32> {
+        let mut cells: Vec<u32> = self.dual.foes(h).iter().map(|f| self.of[f.index()]).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        cells
     }
 
     /// The boundary half-edge after `h` around its cell: turns around the end of `h` until the cell ends, at the
@@ -159,7 +160,7 @@ impl<'a> Tracer<'a> {
         }
         for h in self.boundary.iter().filter(|h| self.dual.across(**h).is_none()) {
             let next = self.next(*h);
-            self.corner[self.dual.from(next)] |= self.foe(*h) != self.foe(next);
+            self.corner[self.dual.from(next)] |= self.foes(*h) != self.foes(next);
         }
         self.mark_loops();
     }
@@ -207,7 +208,7 @@ impl<'a> Tracer<'a> {
             from: self.dual.from(first) as u32,
             next: NONE,
             twin: NONE,
-            foe: self.foe(first),
+            foes: self.foes(first),
             length: run.iter().map(length).sum(),
             feature: run.iter().filter(|h| self.dual.is_feature(**h)).map(length).sum(),
             sharp: run.iter().map(|h| length(h) * self.dual.sharpness(*h)).sum(),

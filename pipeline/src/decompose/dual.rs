@@ -4,6 +4,7 @@ use super::voronoi::Graph;
 use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;
 use crate::space::{Vec3, cross, distance, midpoint, sub};
+use std::collections::BTreeMap;
 
 const NONE: HalfEdgeId = HalfEdgeId(u32::MAX);
 
@@ -26,6 +27,9 @@ pub(super) struct Dual<'a> {
     points: Vec<Vec3>,
     centroids: Vec<Vec3>,
     areas: Vec<f64>,
+    /// The triangles that lie at the same place beyond an open half-edge: where triangles disagree about the
+    /// orientation, and where repair took sheets apart. No chart has both.
+    foes: BTreeMap<HalfEdgeId, Vec<FaceId>>,
     /// Per half-edge the distance of the centroids at its sides by way of its middle.
     steps: Vec<f64>,
 }
@@ -49,11 +53,34 @@ impl<'a> Dual<'a> {
             centroids: triangles.iter().map(centroid).collect(),
             areas: mesh.metric().shapes.iter().map(|s| s.area()).collect(),
             steps: Vec::new(),
+            foes: BTreeMap::new(),
             mesh,
             points,
         };
+        made.foes = made.find_foes();
         made.steps = made.half_edges().map(|h| made.step(h)).collect();
         made
+    }
+
+    fn find_foes(&self) -> BTreeMap<HalfEdgeId, Vec<FaceId>> {
+        let place = |h: HalfEdgeId| {
+            let [a, b] = [self.from(h), self.to(h)].map(|v| self.mesh.welded_vertex(VertexId::at(v)));
+            (a.min(b), a.max(b))
+        };
+        let open = self.half_edges().filter(|h| self.across(*h).is_none());
+        let mut open: Vec<_> = open.map(|h| (place(h), h)).collect();
+        open.sort_unstable();
+        let at_one_place = open.chunk_by(|g, h| g.0 == h.0).filter(|all| all.len() > 1);
+        let others = |all: &[(_, HalfEdgeId)], h: HalfEdgeId| {
+            let others = all.iter().map(|g| g.1).filter(|g| *g != h);
+            (h, others.map(HalfEdgeId::face).collect())
+        };
+        at_one_place.flat_map(|all| all.iter().map(|h| others(all, h.1))).collect()
+    }
+
+    /// The triangles that lie beyond `h` without being joined to it.
+    pub(super) fn foes(&self, h: HalfEdgeId) -> &[FaceId] {
+        self.foes.get(&h).map_or(&[], Vec::as_slice)
     }
 
     fn step(&self, h: HalfEdgeId) -> f64 {

@@ -156,8 +156,7 @@ impl Network<'_> {
                 (fresh, seam) = (true, seam || self.dual.across(h).is_some());
                 let again = std::mem::replace(&mut self.marks.vertices[self.dual.from(h)], now) == now;
                 shape.pinches += usize::from(again);
-                let beyond = self.dual.mesh.edges().twin(h).filter(|_| self.dual.across(h).is_none());
-                shape.meets_itself |= beyond.is_some_and(|t| self.label(t) == label);
+                shape.meets_itself |= self.dual.foes(h).iter().any(|f| self.labels[f.index()] == label);
                 h = self.next(h, label);
             }
             shape.loops += usize::from(fresh);

@@ -29,7 +29,7 @@ pub(super) struct Outline {
     pub loops: Vec<Vec<u32>>,
     /// How often it visits a vertex again.
     pub pinches: usize,
-    /// Whether the region lies on both sides of an edge of its boundary: a surface that cannot be oriented there.
+    /// Whether the region lies on both sides of an edge of its boundary: see [`super::dual::Dual::foes`].
     pub meets_itself: bool,
 }
 
@@ -143,7 +143,7 @@ impl<'a> Regions<'a> {
                 let half = &self.complex.arcs[arc as usize];
                 let again = std::mem::replace(&mut self.stamps.corners[half.from as usize], now) == now;
                 outline.pinches += usize::from(again);
-                outline.meets_itself |= half.foe != NONE && [a, b].contains(&self.of_cell[half.foe as usize]);
+                outline.meets_itself |= half.foes.iter().any(|f| [a, b].contains(&self.of_cell[*f as usize]));
                 arc = self.next(a, b, arc);
             }
             if !turn.is_empty() {

@@ -246,3 +246,38 @@ fn a_crease_that_runs_out_is_no_feature() {
     assert_eq!((ends.charts().len(), ends.feature_edges()), (1, 0));
     assert_eq!((parts.charts().len(), parts.feature_edges()), (2, 60));
 }
+
+/// A tube of which the cross-section is a figure of eight: four sheets meet along a line.
+fn figure_eight(around: u32, length: u32) -> TriangleSoup {
+    let point = |k: u32| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(k % around) / f64::from(around)).sin_cos();
+        [sin, sin * cos, 0.2 * f64::from(k / around)]
+    };
+    // Half way around it comes back to where it began.
+    let vertex = |row: u32, k: u32| row * around + if k % around == around / 2 { 0 } else { k % around };
+    let quad = |k: u32| {
+        let (row, k) = (k / around, k % around);
+        let [a, b, c, d] = [vertex(row, k), vertex(row, k + 1), vertex(row + 1, k + 1), vertex(row + 1, k)];
+        [[a, b, c], [a, c, d]]
+    };
+    let points = (0..around * (length + 1)).map(point).collect();
+    TriangleSoup::new(points, (0..around * length).flat_map(quad).collect()).expect("sound")
+}
+
+#[test]
+fn no_chart_meets_itself_where_sheets_were_taken_apart() {
+    let mesh = surface(&figure_eight(24, 12));
+    assert_eq!(mesh.census().nonmanifold_edges, 12);
+    let atlas = decompose(&mesh, &smooth()).expect("an atlas");
+    assert!(atlas.charts().len() <= 4, "{}", atlas.charts().len());
+    for chart in atlas.charts() {
+        let welded = |v: VertexId| mesh.welded_vertex(chart.vertices()[v.index()]);
+        let rim = chart.holes().iter().flatten().chain(chart.outer());
+        let mut places: Vec<_> = rim.map(|h| [welded(chart.from(*h)), welded(chart.from(h.next()))]).collect();
+        places.iter_mut().for_each(|p| p.sort_unstable());
+        let all = places.len();
+        places.sort_unstable();
+        places.dedup();
+        assert_eq!(places.len(), all, "chart {} meets itself", chart.id());
+    }
+}
