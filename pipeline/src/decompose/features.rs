@@ -4,7 +4,8 @@
 //! (hysteresis). Noise makes such edges, too: slivers have any normal. So the angle is measured again between the mean
 //! normals of the triangles around, weighted by area, on either side: sides that meet around the ends of the edge
 //! within a few triangles are the same side. Chains that are short all told are dropped, and patches that are small
-//! all round are given to the neighbour with which they share most.
+//! all round, or narrow bevels, are given to the neighbour with which they share most. What separates nothing then is
+//! no feature.
 
 use super::Settings;
 use super::dual::Dual;
@@ -30,6 +31,13 @@ const LEAST_OUTLINE: f64 = 0.12;
 pub(super) fn least_outline(dual: &Dual) -> f64 {
     LEAST_OUTLINE * dual.total_area().sqrt()
 }
+
+/// A patch that is narrower than this, likewise, is a bevel, and no face, if the features around it are blunt on average:
+/// what follows would have to resolve it.
+const LEAST_WIDTH: f64 = 0.005;
+
+/// Below this sharpness features are blunt: 60 degrees.
+const BLUNT: f64 = 0.5;
 
 /// The dual graph of a surface with its feature edges marked, and their number.
 pub(super) fn with_features<'a>(mesh: &'a SurfaceMesh, settings: &Settings) -> (Dual<'a>, usize) {
@@ -58,26 +66,21 @@ fn mark_features(dual: &mut Dual, angle: f64) -> usize {
         dual.sharpness[dual.mesh.edges().edge(*h).index()] = *sharpness;
     }
     let kept: Vec<HalfEdgeId> = kept.into_iter().map(|k| k.0).collect();
-    let least = least_outline(dual);
     // Every time some patches are united with others, so that fewer are left.
-    while drop_small_patches(dual, &kept, least) {}
+    while drop_small_patches(dual, &kept) {}
     drop_dangling(dual, &kept);
     dual.sharpness.iter().filter(|s| **s > 0.0).count()
 }
 
-/// Unites each patch whose outline, weighed by its sharpness, is shorter than `least` with the neighbour with which it
-/// shares most: the features between them are none. Whether there was such a patch.
-fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId], least: f64) -> bool {
+/// Unites each patch that is too small to be a face with the neighbour with which it shares most: the features between
+/// them are none. Whether there was such a patch.
+fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId]) -> bool {
     let (patch_of, count) = patches(dual);
     let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
-    let mut outlines = vec![0.0; count];
-    for h in dual.half_edges().filter(|h| dual.across(*h).is_none_or(|t| patch(t) != patch(*h))) {
-        let open = if dual.across(h).is_none() { 1.0 } else { 0.0 };
-        outlines[patch(h)] += (dual.sharpness(h) + open) * dual.length(h);
-    }
+    let small = small_patches(dual, &patch_of, count);
     let both = features.iter().flat_map(|h| [Some(*h), dual.across(*h)]).flatten();
     let pairs = both.filter_map(|h| Some((patch(h), patch(dual.across(h)?), dual.length(h))));
-    let mut between: Vec<_> = pairs.filter(|(a, b, _)| a != b && outlines[*a] < least).collect();
+    let mut between: Vec<_> = pairs.filter(|(a, b, _)| a != b && small[*a]).collect();
     between.sort_unstable_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)).then(x.2.total_cmp(&y.2)));
     let mut united = UnionFind::new(count);
     for of_patch in between.chunk_by(|x, y| x.0 == y.0) {
@@ -94,6 +97,23 @@ fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId], least: f64) -> b
         }
     }
     !between.is_empty()
+}
+
+/// Per patch, whether its outline, weighed by its sharpness, is too short for a face, or whether it is a bevel.
+fn small_patches(dual: &Dual, patch_of: &[u32], count: usize) -> Vec<bool> {
+    let (mut areas, mut outlines, mut weighed) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
+    for (f, patch) in patch_of.iter().enumerate() {
+        areas[*patch as usize] += dual.area(f);
+    }
+    let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
+    for h in dual.half_edges().filter(|h| dual.across(*h).is_none_or(|t| patch(t) != patch(*h))) {
+        let sharpness = if dual.across(h).is_none() { 1.0 } else { dual.sharpness(h) };
+        outlines[patch(h)] += dual.length(h);
+        weighed[patch(h)] += sharpness * dual.length(h);
+    }
+    let (least, width) = (least_outline(dual), LEAST_WIDTH * dual.total_area().sqrt());
+    let is_bevel = |p: usize| 2.0 * areas[p] < width * outlines[p] && weighed[p] < BLUNT * outlines[p];
+    (0..count).map(|p| weighed[p] < least || is_bevel(p)).collect()
 }
 
 /// Features that separate nothing are none: a crease that runs out, or noise.

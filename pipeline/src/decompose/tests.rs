@@ -281,3 +281,29 @@ fn no_chart_meets_itself_where_sheets_were_taken_apart() {
         assert_eq!(places.len(), all, "chart {} meets itself", chart.id());
     }
 }
+
+/// Two square faces at a right angle with a bevel of this width between them.
+fn bevelled(width: f64) -> TriangleSoup {
+    let n = 20;
+    let bevel = width / 2.0_f64.sqrt();
+    let point = |i: u32, j: u32| {
+        let (x, along) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+        // Across the bevel lies the step from row n to row n + 1.
+        let below = (f64::from(j) - f64::from(n + 1)) / f64::from(n);
+        if j <= n { [x, along, 0.0] } else { [x, 1.0 + bevel, -bevel - below] }
+    };
+    let points = (0..=2 * n + 1).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| point(i, j)).collect();
+    let quad = |(i, j): (u32, u32)| {
+        let a = j * (n + 1) + i;
+        let [b, c, d] = [a + 1, a + n + 2, a + n + 1];
+        [[a, b, c], [a, c, d]]
+    };
+    let triangles = (0..2 * n + 1).flat_map(|j| (0..n).map(move |i| (i, j))).flat_map(quad).collect();
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn a_bevel_is_a_face_unless_it_is_narrow() {
+    let charts = |width: f64| atlas(&bevelled(width), &Settings::default()).charts().len();
+    assert_eq!((charts(0.2), charts(0.004)), (3, 2));
+}
