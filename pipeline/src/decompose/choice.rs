@@ -15,49 +15,60 @@ use super::voronoi::Cells;
 /// A chart is taken to need at most this many more.
 const MOST: f64 = 9.0;
 
-/// Per cell its chart. `bound` is the largest area ratio.
-pub(super) fn choose(dual: &Dual, cells: &Cells, found: &Found, limits: Limits, bound: f64) -> Cells {
-    let mut best: Vec<usize> = found.ranked.iter().map(|ways| ways.first().map_or(0, |w| w.1)).collect();
-    let mut needed = vec![usize::MAX; best.len()];
-    // Ways are ranked by their charts, which are never more than those needed: the rest cannot be better then.
-    let ways = found.ranked.iter().map(Vec::len).max().unwrap_or(0);
-    for rank in 0..ways {
-        let next = |component: usize| found.ranked[component].get(rank);
-        let is_open = |c: &usize| found.ranked[*c].len() > 1 && next(*c).is_some_and(|w| w.0.charts < needed[*c]);
-        let open: Vec<usize> = (0..best.len()).filter(is_open).collect();
-        if open.is_empty() {
-            break;
-        }
-        let mut tried = best.clone();
-        open.iter().for_each(|c| tried[*c] = next(*c).map_or(tried[*c], |w| w.1));
-        let counts = needed_charts(dual, cells, found, &tried, limits, bound);
-        for c in open {
-            if counts[c] < needed[c] {
-                (needed[c], best[c]) = (counts[c], tried[c]);
+/// The surface on which charts are counted.
+pub(super) struct Choice<'a> {
+    pub dual: &'a Dual<'a>,
+    pub cells: &'a Cells,
+    pub limits: Limits,
+    /// The largest area ratio.
+    pub bound: f64,
+}
+
+impl Choice<'_> {
+    /// Per cell its chart.
+    pub(super) fn of(&self, found: &Found) -> Cells {
+        let mut best: Vec<usize> = found.ranked.iter().map(|ways| ways.first().map_or(0, |w| w.1)).collect();
+        let mut needed = vec![usize::MAX; best.len()];
+        // Ways are ranked by their charts, which are never more than those needed: the rest cannot be better then.
+        let ways = found.ranked.iter().map(Vec::len).max().unwrap_or(0);
+        for rank in 0..ways {
+            let next = |component: usize| found.ranked[component].get(rank);
+            let is_open = |c: usize| found.ranked[c].len() > 1 && next(c).is_some_and(|w| w.0.charts < needed[c]);
+            let open: Vec<bool> = (0..best.len()).map(is_open).collect();
+            if !open.contains(&true) {
+                break;
+            }
+            let way = |c: usize| next(c).filter(|_| open[c]).map_or(best[c], |w| w.1);
+            let tried: Vec<usize> = (0..best.len()).map(way).collect();
+            let counts = self.needed(found, &tried, &open);
+            for c in (0..best.len()).filter(|c| open[*c]) {
+                if counts[c] < needed[c] {
+                    (needed[c], best[c]) = (counts[c], tried[c]);
+                }
             }
         }
+        found.charts(&best)
     }
-    found.charts(&best)
-}
 
-/// Per component, the charts of the ways that are `tried`, once their seams are straight and the charts that are too
-/// distorted then are split.
-fn needed_charts(dual: &Dual, cells: &Cells, found: &Found, tried: &[usize], limits: Limits, bound: f64) -> Vec<usize> {
-    let charts = found.charts(tried);
-    let mut component = vec![0; charts.count];
-    charts.of.iter().zip(&found.components.of).for_each(|(chart, c)| component[*chart as usize] = *c as usize);
-    let labels = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
-    let mut network = Network::new(dual, labels, limits).keeping(RELAXED);
-    relax(&mut network, 1.0);
-    let mut counts = vec![0; tried.len()];
-    for (component, verdict) in component.into_iter().zip(judge(&network, cells)) {
-        counts[component] += parts(verdict, bound);
+    /// Per component that is `open`, the charts of the ways that are `tried`, once their seams are straight and the
+    /// charts that are too distorted then are split.
+    fn needed(&self, found: &Found, tried: &[usize], open: &[bool]) -> Vec<usize> {
+        let charts = found.charts(tried);
+        let mut component = vec![0; charts.count];
+        charts.of.iter().zip(&found.components.of).for_each(|(chart, c)| component[*chart as usize] = *c as usize);
+        let labels = self.cells.of.iter().map(|c| charts.of[*c as usize]).collect();
+        let mut network = Network::new(self.dual, labels, self.limits).keeping(RELAXED);
+        relax(&mut network, 1.0, |label| open[component[label as usize]]);
+        let mut counts = vec![0; tried.len()];
+        for (component, verdict) in component.into_iter().zip(judge(&network, self.cells)) {
+            counts[component] += self.parts(verdict);
+        }
+        counts
     }
-    counts
-}
 
-/// How many charts one with this verdict becomes: the ratio of each part is the largest one.
-fn parts(verdict: Option<Verdict>, bound: f64) -> usize {
-    let ratio = verdict.map_or(1.0, |v| v.ratio);
-    (ratio.ln() / bound.ln()).ceil().clamp(1.0, MOST) as usize
+    /// How many charts one with this verdict becomes: the ratio of each part is the largest one.
+    fn parts(&self, verdict: Option<Verdict>) -> usize {
+        let ratio = verdict.map_or(1.0, |v| v.ratio);
+        (ratio.ln() / self.bound.ln()).ceil().clamp(1.0, MOST) as usize
+    }
 }

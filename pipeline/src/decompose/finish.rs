@@ -45,13 +45,13 @@ pub(super) fn finish(
         let step = Step { cells, largest: settings.max_area_ratio, gaps: &gaps, shrink: round == 0 };
         let Err(bad) = best.step(&step, breadth) else { continue };
         // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
-        for part in 0..PARTS {
+        for part in [None].into_iter().chain((0..PARTS).map(Some)) {
             let part_of = best.parts(&bad);
-            let in_part = |h: HalfEdgeId| if part_of(h).is_none_or(|p| p == part) { breadth(h) } else { 0.0 };
+            let in_part = |h: HalfEdgeId| if part_of(h) == part { breadth(h) } else { 0.0 };
             let _kept_or_left = best.step(&step, in_part);
         }
     }
-    let Judged { network, verdicts } = best.unbent(cells);
+    let Judged { network, verdicts, .. } = best.unbent(cells);
     let mut atlas = assemble(dual.mesh, &network.labels)?;
     choose_outer(&mut atlas, &verdicts);
     Ok(atlas)
@@ -67,49 +67,60 @@ struct Step<'a> {
     shrink: bool,
 }
 
+/// Per pair of charts the half-edges of all closed seams between them.
+type Loops = BTreeMap<[u32; 2], Vec<HalfEdgeId>>;
+
 /// Seams with what is foretold of their charts.
 struct Judged<'a> {
     network: Network<'a>,
     verdicts: Vec<Option<Verdict>>,
+    /// The pairs of charts between which closed seams stay where they are.
+    held: BTreeSet<[u32; 2]>,
 }
 
 impl<'a> Judged<'a> {
     fn new(network: Network<'a>, cells: &Cells) -> Self {
         let verdicts = judge(&network, cells);
-        Self { network, verdicts }
+        Self { network, verdicts, held: BTreeSet::new() }
     }
 
     /// Straightens the seams as far as `breadth` allows, if no chart's ratio rises above the largest one by that;
     /// otherwise all stays, and these charts are returned.
     fn step(&mut self, step: &Step, breadth: impl Fn(HalfEdgeId) -> f64) -> Result<(), Vec<u32>> {
-        let mut straight = self.straightened(step, &breadth);
-        let dear = if step.shrink { BTreeSet::new() } else { self.dearer_loops(&straight) };
-        if !dear.is_empty() {
-            let edges = self.network.dual.mesh.edges();
-            straight = self.straightened(step, |h| if dear.contains(&edges.edge(h)) { 0.0 } else { breadth(h) });
+        let loops = self.loops();
+        let mut straight = self.straightened(step, &loops, &breadth);
+        let known = self.held.len();
+        if !step.shrink {
+            self.held.extend(self.dearer(&loops, &straight));
+        }
+        if self.held.len() > known {
+            straight = self.straightened(step, &loops, &breadth);
         }
         let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
         let worse = |(new, old): (&Option<Verdict>, &Option<Verdict>)| ratio(new) > step.largest.max(ratio(old));
         let pairs = straight.verdicts.iter().zip(&self.verdicts);
         let bad: Vec<u32> = pairs.zip(0..).filter(|(pair, _)| worse(*pair)).map(|(_, label)| label).collect();
         if bad.is_empty() && straight.network.is_sound() {
-            *self = straight;
+            *self = Self { held: std::mem::take(&mut self.held), ..straight };
             return Ok(());
         }
         Err(bad)
     }
 
-    fn straightened(&self, step: &Step, breadth: impl Fn(HalfEdgeId) -> f64) -> Self {
+    fn straightened(&self, step: &Step, loops: &Loops, breadth: impl Fn(HalfEdgeId) -> f64) -> Self {
+        let edges = self.network.dual.mesh.edges();
+        let held = loops.iter().filter(|l| self.held.contains(l.0)).flat_map(|l| l.1);
+        let held: BTreeSet<EdgeId> = held.map(|h| edges.edge(*h)).collect();
         let mut network = self.network.clone().keeping(LEAST);
-        straighten(&mut network, &step.gaps.crossing, breadth);
+        let free = |h: HalfEdgeId| if held.contains(&edges.edge(h)) { 0.0 } else { breadth(h) };
+        straighten(&mut network, &step.gaps.crossing, free);
         Self::new(network, step.cells)
     }
 
-    /// The edges of the closed seams between charts for which these became dearer: on a sphere, a loop only becomes
-    /// shorter by shrinking to a point, and the chart around it is the more distorted for it.
-    fn dearer_loops(&self, straight: &Self) -> BTreeSet<EdgeId> {
-        let (before, after) = (self.loops(), straight.loops());
-        let edges = self.network.dual.mesh.edges();
+    /// The pairs of charts for which the closed seams between them, `before`, became dearer: on a sphere, a loop only
+    /// becomes shorter by shrinking to a point, and the chart around it is the more distorted for it.
+    fn dearer(&self, before: &Loops, straight: &Self) -> Vec<[u32; 2]> {
+        let after = straight.loops();
         let cost = |judged: &Self, pair: &[u32; 2], length: f64| {
             let of = |label: u32| judged.verdicts[label as usize].map_or(1.0, |v| v.ratio);
             let area: f64 = pair.iter().map(|l| judged.network.areas[*l as usize]).sum();
@@ -119,13 +130,12 @@ impl<'a> Judged<'a> {
         let is_dearer = |pair: &[u32; 2], path: &[HalfEdgeId]| {
             after.get(pair).is_none_or(|a| cost(straight, pair, length(a)) > cost(self, pair, length(path)))
         };
-        let dearer = before.iter().filter(|(pair, path)| is_dearer(pair, path));
-        dearer.flat_map(|(_, path)| path).map(|h| edges.edge(*h)).collect()
+        before.iter().filter(|(pair, path)| is_dearer(pair, path)).map(|(pair, _)| *pair).collect()
     }
 
     /// The half-edges of all closed seams between two charts, by their labels.
-    fn loops(&self) -> BTreeMap<[u32; 2], Vec<HalfEdgeId>> {
-        let mut loops = BTreeMap::<_, Vec<_>>::new();
+    fn loops(&self) -> Loops {
+        let mut loops = Loops::new();
         let dual = self.network.dual;
         for curve in self.network.curves() {
             let (first, last) = (curve[0], curve[curve.len() - 1]);
@@ -141,7 +151,7 @@ impl<'a> Judged<'a> {
     /// around others in fingers had better be split across them.
     fn unbent(self, cells: &Cells) -> Self {
         let mut network = self.network.clone().keeping(RELAXED);
-        let changed = relax(&mut network, BENT) | round_off(&mut network);
+        let changed = relax(&mut network, BENT, |_| true) | round_off(&mut network);
         if changed && network.is_sound() { Self::new(network, cells) } else { self }
     }
 

@@ -46,7 +46,7 @@ use crate::atlas::Atlas;
 use crate::id::HalfEdgeId;
 use crate::mesh::SurfaceMesh;
 pub use assemble::assemble;
-use choice::choose;
+use choice::Choice;
 use complex::Complex;
 use dual::Dual;
 pub use ears::{WithoutEars, split_ears};
@@ -99,7 +99,8 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error
     let (cells, complex) = cells(&dual, &limits);
     let graph = CellGraph::new(&complex);
     let search = Search { complex: &complex, graph: &graph, limits, bound: settings.max_area_ratio };
-    let charts = choose(&dual, &cells, &search.run(), limits, settings.max_area_ratio);
+    let choice = Choice { dual: &dual, cells: &cells, limits, bound: settings.max_area_ratio };
+    let charts = choice.of(&search.run());
     let charts = search.absorb(charts, least_outline(&dual));
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
     let size = |h: HalfEdgeId| graph.area(cells.of[h.face().index()]).sqrt();

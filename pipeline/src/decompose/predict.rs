@@ -175,7 +175,8 @@ struct System<'a> {
 const LONG: f64 = 0.5;
 
 /// The area ratio of a harmonic map of `cells`, whose union has these loops of half-arcs, and the best choice of the
-/// outer one among the long ones. At least 1, infinite where there is no map in doubles.
+/// outer one among the long ones. At least 1, infinite where there is no map in doubles; 1 for a single cell, of which
+/// nothing can be told.
 pub(super) fn area_ratio(complex: &Complex, graph: &CellGraph, cells: &[u32], loops: &[Vec<u32>]) -> (f64, usize) {
     let length = |l: &Vec<u32>| l.iter().map(|a| complex.arcs[*a as usize].length).sum::<f64>();
     let lengths: Vec<f64> = loops.iter().map(length).collect();
@@ -192,7 +193,10 @@ pub(super) fn area_ratio(complex: &Complex, graph: &CellGraph, cells: &[u32], lo
         }
         system.solve().map_or(f64::INFINITY, |places| system.ratio(&places))
     };
-    let long = (0..loops.len()).filter(|i| lengths[*i] >= LONG * longest);
+    let mut long = (0..loops.len()).filter(|i| lengths[*i] >= LONG * longest);
+    if cells.len() == 1 {
+        return (1.0, long.next().unwrap_or(0));
+    }
     let all = long.map(|outer| (with_outer(outer), outer));
     all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).unwrap_or((f64::INFINITY, 0))
 }

@@ -114,7 +114,7 @@ impl Search<'_> {
         let outlines: Vec<_> = (0..regions.all.len() as u32).map(|r| regions.outline_of(r)).collect();
         let judge = |(region, outline): (&Region, &Outline)| {
             let ratio = || area_ratio(self.complex, self.graph, &region.cells, &outline.loops).0;
-            self.limits.allow(&regions.shape(region, outline)) && (region.cells.len() == 1 || ratio() <= largest)
+            self.limits.allow(&regions.shape(region, outline)) && ratio() <= largest
         };
         regions.all.iter().zip(&outlines).map(judge).collect()
     }

@@ -63,16 +63,19 @@ pub(super) fn straighten(network: &mut Network, barred: &[bool], breadth: impl F
     is_worth(lengths[lengths.len() - 1], lengths[0])
 }
 
-/// Pulls straight all seams, and parts of them, that are more than `bent` times as long as they must be, as far as the
-/// others let it, and whatever becomes of the charts, as long as they are legal. Corners stay where they are, and
+/// Pulls straight the seams of charts that are `wanted`, and parts of them, that are more than `bent` times as long as
+/// they must be, as far as the others let it, and whatever becomes of the charts, as long as they are legal. Corners stay where they are, and
 /// closed seams are held at [`PINS`] of their vertices. Whether anything changed.
-pub(super) fn relax(network: &mut Network, bent: f64) -> bool {
+pub(super) fn relax(network: &mut Network, bent: f64, wanted: impl Fn(u32) -> bool) -> bool {
     let everywhere = vec![true; network.dual.mesh.points().len()];
     let barred = vec![false; network.dual.mesh.edges().len()];
     let mut work = Straightening { share: 1.0 / bent, ..Straightening::new(network, 0.0, everywhere, &barred) };
     let mut changed = false;
     for round in 0..ROUNDS {
         for path in work.network.curves() {
+            if !wanted(work.network.label(path[0])) {
+                continue;
+            }
             let closed = work.is_closed(&path);
             // The vertices that hold a closed one are not known any more in the next round.
             let pieces = if closed { PINS } else { 1 };
