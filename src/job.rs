@@ -377,10 +377,9 @@ fn encode(
         colour: network.colours()[i],
     };
     let views: Vec<_> = (0..charts.len()).map(view).collect();
-    let [surface, param] = vtu::encode(&views);
     let files = [
-        ("surface.vtu", surface),
-        ("param.vtu", param),
+        ("surface.vtu", vtu::surface(&views).map_err(not_encoded)?),
+        ("param.vtu", vtu::param(&views).map_err(not_encoded)?),
         ("seams.vtp", vtp::seams(mesh, network).map_err(not_encoded)?),
         ("atlas.vtm", vtm::blocks(&ATLAS)),
     ];

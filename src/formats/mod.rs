@@ -1,6 +1,5 @@
 //! File formats: which there are, and reading a soup of triangles from the bytes of a file.
 
-mod data_array;
 pub mod gmsh;
 mod obj;
 mod polygon;

@@ -1,6 +1,5 @@
-//! surface.vtu and param.vtu: written for ParaView, read again (by `vtkio`) by `planish check`.
+//! surface.vtu and param.vtu, by `vtkio`: written for ParaView, read again by `planish check`.
 
-use super::data_array;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use pipeline::atlas::Chart;
@@ -9,7 +8,11 @@ use pipeline::distortion::CellFields;
 use pipeline::mesh::SurfaceMesh;
 use pipeline::space::midpoint;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use vtkio::model::{Attribute, CellType, Cells, DataSet, IOBuffer, Piece, UnstructuredGridPiece, VertexNumbers, Vtk};
+use vtkio::model::{
+    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, IOBuffer, Piece, UnstructuredGridPiece,
+    Version, VertexNumbers, Vtk,
+};
+use vtkio::xml::Compressor;
 
 /// A chart with everything that its part of the files shows.
 pub struct ChartView<'a> {
@@ -27,7 +30,7 @@ pub struct ChartView<'a> {
     pub colour: u32,
 }
 
-/// Why a file cannot be read.
+/// Why a file cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum VtuError {
     /// `vtkio` says why.
@@ -65,44 +68,23 @@ pub fn shift(index: usize, count: usize) -> [f64; 2] {
     [2.25 * (index % columns) as f64, -2.25 * (index / columns) as f64]
 }
 
-/// The bytes of surface.vtu, and those of param.vtu: the same cells in the parametric plane, charts side by side.
-pub fn encode(views: &[ChartView]) -> [Vec<u8>; 2] {
-    let (mut fields, mut cells) = (String::new(), String::new());
-    write_point_fields(&mut fields, views);
-    write_cell_fields(&mut fields, views);
-    write_cells(&mut cells, views);
-    let in_space = places(views, |i, node, _| position(&views[i], node));
-    let in_plane = places(views, |i, _, uv| {
-        let [x, y] = shift(i, views.len());
+/// The bytes of surface.vtu.
+///
+/// # Errors
+/// [`VtuError::Library`].
+pub fn surface(views: &[ChartView]) -> Result<Vec<u8>, VtuError> {
+    encode(views, "planish surface", |view, _, node, _| position(view, node))
+}
+
+/// The bytes of param.vtu: the same cells in the parametric plane, charts side by side.
+///
+/// # Errors
+/// [`VtuError::Library`].
+pub fn param(views: &[ChartView]) -> Result<Vec<u8>, VtuError> {
+    encode(views, "planish parametric plane", |_, index, _, uv| {
+        let [x, y] = shift(index, views.len());
         [uv[0] + x, uv[1] + y, 0.0]
-    });
-    [file(views, &fields, in_space, &cells), file(views, &fields, in_plane, &cells)]
-}
-
-/// The coordinates of all nodes; `place` gives them from index of the chart, node, uv.
-fn places<'a>(
-    views: &'a [ChartView],
-    place: impl Fn(usize, usize, [f64; 2]) -> [f64; 3] + Copy + 'a,
-) -> impl Iterator<Item = f64> + 'a {
-    let of_chart = move |(i, v): (usize, &'a ChartView)| {
-        v.map.map().nodes.iter().enumerate().flat_map(move |(node, p)| place(i, node, p.uv()))
-    };
-    views.iter().enumerate().flat_map(of_chart)
-}
-
-/// One file, with the nodes at these coordinates.
-fn file(views: &[ChartView], fields: &str, coordinates: impl Iterator<Item = f64>, cells: &str) -> Vec<u8> {
-    let nodes: usize = views.iter().map(|v| v.map.map().nodes.len()).sum();
-    let triangles: usize = views.iter().map(|v| v.map.map().cells.len()).sum();
-    let mut text = format!(
-        "{HEAD}<UnstructuredGrid><Piece NumberOfPoints=\"{nodes}\" NumberOfCells=\"{triangles}\">{fields}<Points>"
-    );
-    text.reserve(cells.len() + 32 * nodes + 1024);
-    data_array::write(&mut text, "Points", 3, coordinates);
-    text += "</Points>";
-    text += cells;
-    text += "</Piece></UnstructuredGrid></VTKFile>";
-    text.into_bytes()
+    })
 }
 
 /// The position of a node in space: that of a vertex, or the middle of a straight edge.
@@ -116,59 +98,84 @@ fn position(view: &ChartView, node: usize) -> [f64; 3] {
     midpoint(place(view.chart.from(h)), place(view.chart.from(h.next())))
 }
 
-/// `uv` and `vertex` of every node.
-fn write_point_fields(text: &mut String, views: &[ChartView]) {
-    let uv = |v: &ChartView| v.map.map().nodes.iter().flat_map(|p| p.uv()).collect::<Vec<f64>>();
-    let vertices = |v: &ChartView| {
-        let welded = |u: &pipeline::id::VertexId| v.mesh.input_vertex(*u).map_or(-2, |w| w as i32);
-        let mut vertices: Vec<i32> = v.chart.vertices().iter().map(welded).collect();
-        vertices.resize(v.map.map().nodes.len(), -1);
-        vertices
+/// Writes all charts as one piece; `place` gives the position of a node from view, index of the chart, node, uv.
+fn encode(
+    views: &[ChartView],
+    title: &str,
+    place: impl Fn(&ChartView, usize, usize, [f64; 2]) -> [f64; 3],
+) -> Result<Vec<u8>, VtuError> {
+    let mut points: Vec<f64> = Vec::new();
+    let mut connectivity: Vec<u64> = Vec::new();
+    for (index, view) in views.iter().enumerate() {
+        let base = points.len() as u64 / 3;
+        for (node, p) in view.map.map().nodes.iter().enumerate() {
+            points.extend(place(view, index, node, p.uv()));
+        }
+        connectivity.extend(view.map.map().cells.iter().flatten().map(|n| base + u64::from(*n)));
+    }
+    let cells = connectivity.len() / 6;
+    let offsets = (1..=cells as u64).map(|i| 6 * i).collect();
+    let vtk = Vtk {
+        version: Version::new_xml(1, 0),
+        byte_order: ByteOrder::LittleEndian,
+        title: title.to_owned(),
+        file_path: None,
+        data: DataSet::inline(UnstructuredGridPiece {
+            points: points.into(),
+            cells: Cells {
+                cell_verts: VertexNumbers::XML { connectivity, offsets },
+                types: vec![CellType::QuadraticTriangle; cells],
+            },
+            data: Attributes { point: point_fields(views), cell: cell_fields(views) },
+        }),
     };
-    *text += "<PointData>";
-    data_array::write(text, "uv", 2, views.iter().flat_map(uv));
-    data_array::write(text, "vertex", 1, views.iter().flat_map(vertices));
-    *text += "</PointData>";
+    let library = |e: &dyn std::fmt::Display| VtuError::Library(e.to_string());
+    let mut bytes = Vec::new();
+    let file = vtk.try_into_xml_format(Compressor::LZ4, 1).map_err(|e| library(&e))?;
+    file.write(&mut bytes).map_err(|e| library(&e))?;
+    Ok(bytes)
+}
+
+fn array(name: &str, components: u32, data: impl Into<IOBuffer>) -> Attribute {
+    Attribute::DataArray(DataArray::new(name, components).with_data(data))
+}
+
+/// `uv` and `vertex` of every node.
+fn point_fields(views: &[ChartView]) -> Vec<Attribute> {
+    let nodes = |v: &ChartView| v.map.map().nodes.clone();
+    let uv: Vec<f64> = views.iter().flat_map(nodes).flat_map(|p| p.uv()).collect();
+    let mut vertex: Vec<i32> = Vec::new();
+    for view in views {
+        let welded = |v: &pipeline::id::VertexId| view.mesh.input_vertex(*v).map_or(-2, |w| w as i32);
+        vertex.extend(view.chart.vertices().iter().map(welded));
+        vertex.resize(vertex.len() + view.map.map().nodes.len() - view.chart.vertices().len(), -1);
+    }
+    vec![array("uv", 2, uv), array("vertex", 1, vertex)]
 }
 
 /// The fields of every triangle.
-fn write_cell_fields(text: &mut String, views: &[ChartView]) {
-    *text += "<CellData>";
-    let each = |of: &dyn Fn(usize) -> i32| -> Vec<i32> {
-        views.iter().enumerate().flat_map(|(i, v)| vec![of(i); v.fields.len()]).collect()
-    };
-    data_array::write(text, "chart", 1, each(&|i| i as i32));
+fn cell_fields(views: &[ChartView]) -> Vec<Attribute> {
+    let chart: Vec<i32> = views.iter().zip(0..).flat_map(|(v, i)| vec![i; v.fields.len()]).collect();
+    let colour: Vec<i32> = views.iter().flat_map(|v| vec![v.colour as i32; v.fields.len()]).collect();
     let source = |v: &ChartView| -> Vec<i32> {
         v.chart.faces().iter().map(|f| v.mesh.source_triangle(f.index()) as i32).collect()
     };
-    data_array::write(text, "triangle", 1, views.iter().flat_map(source));
-    let mut field = |name: &str, get: fn(&CellFields) -> f64| {
-        data_array::write(text, name, 1, views.iter().flat_map(|v| v.fields).map(get));
+    let triangle: Vec<i32> = views.iter().flat_map(source).collect();
+    let untangled: Vec<u8> = views.iter().flat_map(|v| v.untangled).map(|u| u8::from(*u)).collect();
+    let field = |name: &str, get: fn(&CellFields) -> f64| {
+        array(name, 1, views.iter().flat_map(|v| v.fields).map(get).collect::<Vec<f64>>())
     };
-    field("det_min", |f| f.det_min);
-    field("det_max", |f| f.det_max);
-    field("jacobian_ratio", |f| f.jacobian_ratio);
-    field("conformal_distortion", |f| f.conformal_distortion);
-    field("area_scale", |f| f.area_scale);
-    data_array::write(text, "untangled", 1, views.iter().flat_map(|v| v.untangled).map(|u| u8::from(*u)));
-    data_array::write(text, "colour", 1, each(&|i| views[i].colour as i32));
-    *text += "</CellData>";
-}
-
-/// The 6-node triangles, those of all charts in one piece.
-fn write_cells(text: &mut String, views: &[ChartView]) {
-    let mut connectivity: Vec<u64> = Vec::new();
-    let mut base = 0;
-    for map in views.iter().map(|v| v.map.map()) {
-        connectivity.extend(map.cells.iter().flatten().map(|n| base + u64::from(*n)));
-        base += map.nodes.len() as u64;
-    }
-    let cells = connectivity.len() as u64 / 6;
-    *text += "<Cells>";
-    data_array::write(text, "connectivity", 1, connectivity);
-    data_array::write(text, "offsets", 1, (1..=cells).map(|i| 6 * i));
-    data_array::write(text, "types", 1, (0..cells).map(|_| CellType::QuadraticTriangle as u8));
-    *text += "</Cells>";
+    vec![
+        array("chart", 1, chart),
+        array("triangle", 1, triangle),
+        field("det_min", |f| f.det_min),
+        field("det_max", |f| f.det_max),
+        field("jacobian_ratio", |f| f.jacobian_ratio),
+        field("conformal_distortion", |f| f.conformal_distortion),
+        field("area_scale", |f| f.area_scale),
+        array("untangled", 1, untangled),
+        array("colour", 1, colour),
+    ]
 }
 
 /// How every file of planish's begins.
