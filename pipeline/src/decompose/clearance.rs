@@ -54,7 +54,7 @@ fn places(network: &Network) -> Vec<Place> {
     let mut places: Vec<Place> = (0..dual.mesh.points().len()).map(vertex).collect();
     for (curve, path) in network.curves().iter().enumerate() {
         let total: f64 = path.iter().map(|h| dual.length(*h)).sum();
-        let closed = dual.from(path[0]) == dual.to(path[path.len() - 1]);
+        let closed = dual.is_closed(path);
         let mut from_begin = 0.0;
         for h in path {
             places[dual.from(*h)] = Place::Seam { curve, from_begin, to_end: total - from_begin, closed };

@@ -115,6 +115,11 @@ impl<'a> Dual<'a> {
         self.from(h.next())
     }
 
+    /// Whether a path along half-edges, which is not empty, ends where it began.
+    pub(super) fn is_closed(&self, path: &[HalfEdgeId]) -> bool {
+        self.from(path[0]) == self.to(path[path.len() - 1])
+    }
+
     pub(super) fn point(&self, vertex: usize) -> Vec3 {
         self.points[vertex]
     }

@@ -138,9 +138,8 @@ impl<'a> Judged<'a> {
         let mut loops = Loops::new();
         let dual = self.network.dual;
         for curve in self.network.curves() {
-            let (first, last) = (curve[0], curve[curve.len() - 1]);
-            let Some(beyond) = dual.across(first).filter(|_| dual.from(first) == dual.to(last)) else { continue };
-            let mut pair = [first, beyond].map(|h| self.network.label(h));
+            let Some(beyond) = dual.across(curve[0]).filter(|_| dual.is_closed(&curve)) else { continue };
+            let mut pair = [curve[0], beyond].map(|h| self.network.label(h));
             pair.sort_unstable();
             loops.entry(pair).or_default().extend(curve);
         }

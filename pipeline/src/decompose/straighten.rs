@@ -76,7 +76,7 @@ pub(super) fn relax(network: &mut Network, bent: f64, wanted: impl Fn(u32) -> bo
             if !wanted(work.network.label(path[0])) {
                 continue;
             }
-            let closed = work.is_closed(&path);
+            let closed = work.dual.is_closed(&path);
             // The vertices that hold a closed one are not known any more in the next round.
             let pieces = if closed { PINS } else { 1 };
             for part in path.chunks(path.len().div_ceil(pieces)).filter(|_| !closed || round == 0) {
@@ -94,7 +94,7 @@ pub(super) fn round_off(network: &mut Network) -> bool {
     let mut work = Straightening::new(network, 0.0, everywhere, &barred);
     let mut changed = false;
     for path in work.network.curves() {
-        changed |= work.is_closed(&path) && work.shorten_loop(path, EIGHTHS, 2 * EIGHTHS);
+        changed |= work.dual.is_closed(&path) && work.shorten_loop(path, EIGHTHS, 2 * EIGHTHS);
     }
     changed
 }
@@ -122,7 +122,7 @@ impl<'n, 'a> Straightening<'n, 'a> {
     /// One pass over all seams.
     fn seams(&mut self) {
         for path in self.network.curves() {
-            let closed = self.is_closed(&path);
+            let closed = self.dual.is_closed(&path);
             let tried = (None, path);
             if self.vain.contains(&tried) {
                 continue;
@@ -181,10 +181,6 @@ impl<'n, 'a> Straightening<'n, 'a> {
         };
         let laid = self.network.lay(path, &[Path { half_edges: half_edges.clone(), left, right }], &labels);
         if laid { Ok(half_edges) } else { Err(false) }
-    }
-
-    fn is_closed(&self, path: &[HalfEdgeId]) -> bool {
-        self.dual.from(path[0]) == self.dual.to(path[path.len() - 1])
     }
 
     /// A closed seam: its parts, then those that begin in the middle of these. Whether it became shorter.
