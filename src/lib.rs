@@ -6,6 +6,7 @@
 pub mod cli;
 pub mod formats;
 pub mod hand_off;
+pub mod hooks;
 pub mod inputs;
 pub mod job;
 pub mod logging;

@@ -1,5 +1,6 @@
 //! Settings: what the user may say, typed and checked in one place.
 
+use crate::hooks::{Hook, HookRefused};
 use pipeline::Order;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -61,7 +62,23 @@ impl std::str::FromStr for FeatureAngle {
     }
 }
 
-/// What was said, on the command line or in planish.toml; the same names in both.
+/// A command that runs after an input is certified: a table `[[on_certified]]` of planish.toml (see docs/hooks.md).
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OnCertified {
+    /// Program and arguments, with placeholders such as `{folder}`.
+    pub command: Vec<String>,
+    /// Wall-clock seconds after which it is ended; an hour where nothing is said.
+    #[serde(rename = "time-limit", default = "an_hour")]
+    pub time_limit: f64,
+}
+
+fn an_hour() -> f64 {
+    3600.0
+}
+
+/// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
+/// the file alone.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Said {
@@ -96,6 +113,8 @@ pub struct Said {
     pub verbose: Option<u8>,
     /// Print nothing but errors.
     pub quiet: Option<bool>,
+    /// Commands that run after an input is certified, in their order.
+    pub on_certified: Option<Vec<OnCertified>>,
 }
 
 /// Checked settings.
@@ -127,6 +146,8 @@ pub struct Settings {
     pub verbose: u8,
     /// Print nothing but errors.
     pub quiet: bool,
+    /// Commands that run after an input is certified, in their order.
+    pub on_certified: Vec<Hook>,
 }
 
 impl Settings {
@@ -162,6 +183,14 @@ pub enum SettingsError {
     /// The edge length is none.
     #[error("size is {0}; it must be a positive number: the edge length in the unit of the input")]
     Size(f64),
+    /// A command cannot run.
+    #[error("[[on_certified]], table {table}: {error}")]
+    OnCertified {
+        /// Which, from 1.
+        table: usize,
+        /// Why.
+        error: HookRefused,
+    },
     /// The file cannot be read.
     #[error("cannot read the settings file {path}: {error}")]
     Unreadable {
@@ -207,6 +236,7 @@ impl Said {
             log: self.log.or(other.log),
             verbose: self.verbose.or(other.verbose),
             quiet: self.quiet.or(other.quiet),
+            on_certified: self.on_certified.or(other.on_certified),
         }
     }
 
@@ -256,8 +286,14 @@ impl Said {
             log: self.log.unwrap_or_default(),
             verbose: self.verbose.unwrap_or(0),
             quiet: self.quiet.unwrap_or(false),
+            on_certified: hooks(self.on_certified.unwrap_or_default())?,
         })
     }
+}
+
+fn hooks(said: Vec<OnCertified>) -> Result<Vec<Hook>, SettingsError> {
+    let check = |(i, hook)| Hook::new(hook).map_err(|error| SettingsError::OnCertified { table: i + 1, error });
+    said.into_iter().enumerate().map(check).collect()
 }
 
 #[cfg(test)]
@@ -301,5 +337,36 @@ mod tests {
         assert!(toml::from_str::<Said>("feature-angle = \"of\"").is_err());
         let file: Said = toml::from_str("hand-off = \"none\"\nsize = 0.5").expect("valid");
         assert_eq!((file.hand_off, file.size), (Some(HandOff::None), Some(0.5)));
+    }
+
+    #[test]
+    fn commands_are_said_in_the_file_and_checked_at_once() {
+        let read = |text: &str| toml::from_str::<Said>(text);
+        let said = read(
+            "order = 1\n[[on_certified]]\ncommand = [\"gmsh\", \"{remesh}\"]\ntime-limit = 600\n\
+             [[on_certified]]\ncommand = [\"a\"]\n",
+        );
+        let settings = Said::default().or(said.expect("valid")).check().expect("in range");
+        let limits: Vec<f64> = settings.on_certified.iter().map(|h| h.configured().time_limit).collect();
+        assert_eq!(limits, [600.0, 3600.0]);
+        for wrong in ["command = \"gmsh\"", "command = [1]", "time-limit = 1", "command = [\"a\"]\ntime_limit = 1"] {
+            assert!(read(&format!("[[on_certified]]\n{wrong}")).is_err(), "{wrong}");
+        }
+        let refused = [
+            ("command = []", "names no program"),
+            ("command = [\"\", \"a\"]", "names no program"),
+            ("command = [\"a\", \"{foldr}\"]", "part 2 (\"{foldr}\"): {foldr} is no placeholder; there are {input}"),
+            ("command = [\"a\", \"b\", \"{folder\"]", "part 3 (\"{folder\"): the brace at character 1 has no partner"),
+            ("command = [\"./a.sh\"]", "relative path \"./a.sh\"; give the full path"),
+            ("command = [\"a\"]\ntime-limit = 0", "time-limit is 0; it must be"),
+            ("command = [\"a\"]\ntime-limit = -1.5", "time-limit is -1.5"),
+            ("command = [\"a\"]\ntime-limit = inf", "time-limit is inf"),
+            ("command = [\"a\"]\ntime-limit = nan", "time-limit is NaN"),
+        ];
+        for (text, expected) in refused {
+            let said = read(&format!("[[on_certified]]\ncommand = [\"first\"]\n[[on_certified]]\n{text}"));
+            let told = said.expect("well-formed").check().expect_err(text).to_string();
+            assert!(told.starts_with("[[on_certified]], table 2: ") && told.contains(expected), "{told}");
+        }
     }
 }
