@@ -4,9 +4,11 @@
 //! The Python environment is made beside the sources (`.venv`, not under version control) when a test first needs
 //! it, with the packages of requirements.txt.
 
+pub mod recipe;
 pub mod remesh;
 
 use crate::support::{Out, fixture, root};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::LazyLock;
@@ -44,6 +46,14 @@ fn script(name: &str) -> Command {
     let mut command = Command::new(&*PYTHON);
     command.arg(root().join("tests/interop").join(name));
     command
+}
+
+/// The PATH on which the programs of the environment (`gmsh`, `python`) are found first.
+pub fn tools() -> OsString {
+    let own = PYTHON.parent().expect("a folder").to_owned();
+    let inherited = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::iter::once(own).chain(std::env::split_paths(&inherited));
+    std::env::join_paths(folders).expect("no folder has a colon in its name")
 }
 
 /// VTK opens both files of a result without a word, finds every field, and every triangle is valid.
