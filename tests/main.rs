@@ -7,5 +7,6 @@ mod fixtures;
 mod interop;
 mod invariants;
 mod legality;
+mod packaging;
 mod run;
 mod support;

@@ -1,0 +1,80 @@
+//! What packagers get works: the unit, and the example of a settings file.
+
+use crate::support::{Out, fixture, root};
+use planish::settings::{Said, Settings};
+use std::process::Command;
+
+fn packaged(name: &str) -> String {
+    std::fs::read_to_string(root().join("packaging").join(name)).expect("committed")
+}
+
+/// The example with everything switched on that can be.
+fn all_switched_on() -> String {
+    let on = |line: &str| match line.strip_prefix('#') {
+        Some(setting) if !setting.is_empty() && !setting.starts_with(' ') => setting.to_owned(),
+        _ => line.to_owned(),
+    };
+    packaged("planish.toml").lines().map(on).collect::<Vec<_>>().join("\n")
+}
+
+fn read(text: &str) -> Said {
+    toml::from_str(text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn the_example_names_every_setting() {
+    let unknown = toml::from_str::<Said>("no-such-setting = 1").expect_err("unknown").to_string();
+    let (_, list) = unknown.split_once("expected one of ").expect("a list of settings");
+    let settings: Vec<&str> = list.split('`').skip(1).step_by(2).collect();
+    assert!(settings.contains(&"order") && settings.contains(&"on_certified"), "{unknown}");
+    let example: toml::Table = toml::from_str(&all_switched_on()).expect("valid");
+    for setting in settings {
+        assert!(example.contains_key(setting), "packaging/planish.toml does not show {setting}");
+    }
+}
+
+#[test]
+fn the_example_works_as_it_is_and_switched_on_and_shows_the_defaults() {
+    let defaults = Said::default().check().expect("in range");
+    let as_it_is = read(&packaged("planish.toml")).check().expect("in range");
+    assert_eq!(as_it_is, Settings { verbose: 1, ..defaults.clone() });
+    let all = read(&all_switched_on()).check().expect("in range");
+    let without_default = Settings {
+        out: all.out.clone(),
+        log: all.log,
+        max_triangles: all.max_triangles,
+        size: all.size,
+        on_certified: all.on_certified.clone(),
+        ..as_it_is
+    };
+    assert_eq!(all, without_default);
+    assert_eq!(all.on_certified.len(), 1);
+    let out = Out::new();
+    let config = root().join("packaging/planish.toml");
+    let ended = out.run(&[&fixture("disk.stl")], &["--config", config.to_str().expect("UTF-8")]);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+}
+
+#[test]
+fn systemd_has_nothing_against_the_unit() {
+    if Command::new("systemd-analyze").arg("--version").output().is_err() {
+        eprintln!("skipped: no systemd-analyze (apt-get install systemd)");
+        return;
+    }
+    let verify = |unit: &str| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("planish.service");
+        std::fs::write(&path, unit).expect("written");
+        let mut command = Command::new("systemd-analyze");
+        let output = command.args(["verify", "--man=no", "--recursive-errors=no"]).arg(path).output().expect("runs");
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        let about_it: Vec<&str> = told.lines().filter(|l| l.contains("planish")).collect();
+        (output.status.success(), about_it.join("\n"))
+    };
+    // The program must be there: the one of this build is.
+    let unit = packaged("planish.service").replace("/usr/local/bin/planish", env!("CARGO_BIN_EXE_planish"));
+    assert!(unit.contains(&format!("ExecStart={} watch ", env!("CARGO_BIN_EXE_planish"))));
+    assert_eq!(verify(&unit), (true, String::new()));
+    let (good, told) = verify(&unit.replace("KillMode=mixed", "KillMode=mixd"));
+    assert!(!good || told.contains("KillMode"), "a broken twin is found: {told}");
+}
