@@ -9,6 +9,7 @@ use crate::settings::{self, Settings};
 use pipeline::atlas::Atlas;
 use pipeline::decompose::split_ears;
 use pipeline::distortion::{self, CellFields};
+use pipeline::host::Alone;
 use pipeline::mesh::{SurfaceMesh, TriangleSoup};
 use pipeline::repair::Repaired;
 use pipeline::seams::SeamNetwork;
@@ -257,7 +258,7 @@ fn stages(
     let found = repaired(soup, settings)?;
     report.surface = Some(report::surface(&found));
     report.repairs = Some(report::repairs(&found.report));
-    let atlas = decompose(&found.mesh, &settings.decompose()).map_err(internal)?;
+    let atlas = decompose(&found.mesh, &settings.decompose(), &Alone).map_err(internal)?;
     let feature_edges = atlas.feature_edges();
     report.decomposition = Some(Decomposition { feature_edges, ..Decomposition::default() });
     let (mesh, atlas) = match split_ears(&found.mesh, &atlas, settings.decompose().max_triangles).map_err(internal)? {
@@ -308,10 +309,11 @@ fn map_and_write(
     let (mut charts, mut done) = (Vec::new(), Vec::new());
     for chart in atlas.into_charts() {
         clock.next(report, Stage::Map);
-        let mapped = map_or_split(mesh, chart, settings.order, &settings.decompose()).map_err(|e| map_refusal(&e))?;
+        let mapped =
+            map_or_split(mesh, chart, settings.order, &settings.decompose(), &Alone).map_err(|e| map_refusal(&e))?;
         clock.next(report, Stage::Untangle);
         for (chart, mapped) in mapped {
-            let finished = finish_or_split(mesh, chart, mapped, settings.order, &settings.decompose());
+            let finished = finish_or_split(mesh, chart, mapped, settings.order, &settings.decompose(), &Alone);
             for (chart, certified) in finished.map_err(|e| map_refusal(&e))? {
                 charts.push(chart);
                 done.push(certified);
@@ -346,7 +348,7 @@ fn map_refusal(error: &SplitError) -> Reason {
             ..
         }))) => Code::TooLarge,
         SplitError::Map(_) => Code::NeedsSplit,
-        SplitError::Split(_) => Code::Internal,
+        SplitError::Split(_) | SplitError::Cancelled => Code::Internal,
     };
     Reason::new(code, error)
 }

@@ -2,6 +2,7 @@
 
 use crate::fixtures::{ALL, generate};
 use pipeline::atlas::Chart;
+use pipeline::host::Alone;
 use pipeline::mesh::TriangleSoup;
 use pipeline::{CertifiedChart, Order, decompose, distortion, finish_or_split, map_or_split, repair};
 use planish::formats::{self, Kind};
@@ -13,10 +14,13 @@ const MAX_AREA_RATIO: f64 = 1e7;
 fn charts(soup: &TriangleSoup) -> Vec<CertifiedChart> {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
     let settings = decompose::Settings { max_area_ratio: MAX_AREA_RATIO, feature_angle: None, ..Default::default() };
-    let atlas = decompose(&mesh, &settings).expect("an atlas");
-    let parts = |chart| map_or_split(&mesh, chart, Order::Quadratic, &settings).expect("maps");
+    let atlas = decompose(&mesh, &settings, &Alone).expect("an atlas");
+    let parts = |chart| map_or_split(&mesh, chart, Order::Quadratic, &settings, &Alone).expect("maps");
     let finished = |(chart, mapped)| {
-        finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings).expect("maps").into_iter().map(within_bound)
+        finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings, &Alone)
+            .expect("maps")
+            .into_iter()
+            .map(within_bound)
     };
     atlas.into_charts().into_iter().flat_map(parts).flat_map(finished).collect()
 }

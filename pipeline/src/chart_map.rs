@@ -7,6 +7,7 @@ use crate::closed::ClosedChart;
 use crate::decompose;
 use crate::distortion;
 use crate::grid::GridPoint;
+use crate::host::{Alone, Cancelled, Host, Pace};
 use crate::linear::{self, LinearMap, linear_map, lower_ears};
 use crate::mesh::SurfaceMesh;
 use crate::quadratic::{QuadraticMap, least_det, quadratic_map};
@@ -34,7 +35,7 @@ pub struct MappedChart {
     harmonic: Option<Result<QuadraticMap, sparse::Error>>,
 }
 
-/// Why a chart cannot be mapped as a whole. Both mean: split it.
+/// Why a chart cannot be mapped as a whole. All but the last mean: split it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
     /// No linear map.
@@ -51,6 +52,15 @@ pub enum MapError {
         /// Per triangle, the logarithm of the area scale around it.
         log_scales: Vec<f64>,
     },
+    /// The map was not wanted any more.
+    #[error("the map was cancelled")]
+    Cancelled,
+}
+
+impl From<Cancelled> for MapError {
+    fn from(Cancelled: Cancelled) -> Self {
+        Self::Cancelled
+    }
 }
 
 /// A chart with its certified map and the account of how it was found.
@@ -85,33 +95,41 @@ pub struct Harmonic {
 /// # Errors
 /// [`MapError`]: the chart must be split.
 pub fn map_chart(chart: &Chart, order: Order) -> Result<MappedChart, MapError> {
-    map_within(chart, order, f64::INFINITY)
+    map_within(chart, order, f64::INFINITY, &Alone)
 }
 
 /// As [`map_chart`], where a chart whose certified map would exceed `max_area_ratio` need not be mapped.
 ///
 /// # Errors
-/// [`MapError`]: the chart must be split.
-pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64) -> Result<MappedChart, MapError> {
+/// [`MapError`]: the chart must be split, or nobody waits for the map any more.
+pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64, host: &dyn Host) -> Result<MappedChart, MapError> {
+    let pace = Pace::new(host);
+    let visited_all = || pace.after(chart.triangles().len());
     let closed = ClosedChart::new(chart);
+    visited_all()?;
     let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
     let mut boundary = Boundary::circle(&closed, mids);
-    let linear = linear_map(&closed, &boundary)?;
+    let linear = linear_map(&closed, &boundary, host);
+    // Before its error is believed: it may have been cancelled.
+    pace.end()?;
+    let linear = linear?;
     lower_ears(&closed, &linear, &mut boundary);
     let start = linear.raised(&closed, &boundary);
     let centres = (0..closed.loops().len()).map(|k| start[closed.centre_node(k)]).collect();
     let certified_start = prove(planar(&closed, &start, centres)).map_err(MapError::Start)?;
+    visited_all()?;
     let ratio = distortion::area_ratio(chart, &certified_start);
     let within = |ratio: f64, bound: f64| {
         let stretched = || MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) };
         if ratio > bound { Err(stretched()) } else { Ok(()) }
     };
     within(ratio, if order == Order::Linear { max_area_ratio } else { HOPELESS * max_area_ratio })?;
-    let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary));
+    let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary, host));
     if let Some(Ok(map)) = &harmonic {
         let of_harmonic = distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n]));
         within(ratio.sqrt() * of_harmonic.sqrt(), max_area_ratio)?;
     }
+    pace.end()?;
     Ok(MappedChart { closed, linear, start, certified_start, harmonic })
 }
 
@@ -130,22 +148,24 @@ pub fn map_or_split(
     chart: Chart,
     order: Order,
     settings: &decompose::Settings,
+    host: &dyn Host,
 ) -> Result<Vec<(Chart, MappedChart)>, SplitError> {
     let mut mapped = Vec::new();
     let mut waiting = vec![chart];
     while let Some(chart) = waiting.pop() {
-        let error = match map_within(&chart, order, settings.max_area_ratio) {
+        let error = match map_within(&chart, order, settings.max_area_ratio, host) {
             Ok(map) => {
                 mapped.push((chart, map));
                 continue;
             }
+            Err(MapError::Cancelled) => return Err(SplitError::Cancelled),
             Err(error) => error,
         };
         let scales = if let MapError::Stretched { log_scales, .. } = &error { Some(&log_scales[..]) } else { None };
-        match decompose::split(mesh, &chart, scales, settings)? {
+        match decompose::split(mesh, &chart, scales, settings, host)? {
             Some(parts) => waiting.extend(parts.into_iter().rev()),
             // A single triangle: its map is what it is.
-            None => mapped.push((chart.clone(), map_chart(&chart, order)?)),
+            None => mapped.push((chart.clone(), map_within(&chart, order, f64::INFINITY, host)?)),
         }
     }
     Ok(mapped)
@@ -156,15 +176,41 @@ pub fn map_or_split(
 pub enum SplitError {
     /// A single triangle does not map.
     #[error(transparent)]
-    Map(#[from] MapError),
+    Map(MapError),
     /// A part is no chart: a fault of planish.
     #[error(transparent)]
-    Split(#[from] decompose::Error),
+    Split(decompose::Error),
+    /// The map was not wanted any more.
+    #[error("the map was cancelled")]
+    Cancelled,
+}
+
+impl From<MapError> for SplitError {
+    fn from(error: MapError) -> Self {
+        if error == MapError::Cancelled { Self::Cancelled } else { Self::Map(error) }
+    }
+}
+
+impl From<decompose::Error> for SplitError {
+    fn from(error: decompose::Error) -> Self {
+        if error == decompose::Error::Cancelled { Self::Cancelled } else { Self::Split(error) }
+    }
+}
+
+impl From<Cancelled> for SplitError {
+    fn from(Cancelled: Cancelled) -> Self {
+        Self::Cancelled
+    }
 }
 
 /// Untangles the harmonic map of a chart and certifies the result; where that cannot be proven, the result is the
 /// feasible start.
 pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
+    finish(mapped, &Alone)
+}
+
+/// As [`finish_chart`]. Where nobody waits for the result any more, it is unfinished.
+fn finish(mapped: MappedChart, host: &dyn Host) -> CertifiedChart {
     let MappedChart { closed, linear, start, certified_start, harmonic } = mapped;
     let of_start = |start: CertifiedMap, linear, unsolved| CertifiedChart {
         certified: start.clone(),
@@ -182,7 +228,7 @@ pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
     let mut invalid = vec![false; closed.own_triangles()];
     map.invalid().iter().for_each(|f| invalid[f.index()] = true);
     let found = Harmonic { invalid, det_min: least_det(&closed, &map) };
-    let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &start, &map);
+    let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &start, &map, host);
     let certified = match prove(planar(&closed, &nodes, hole_centres)) {
         Ok(certified) => certified,
         Err(_) => {
@@ -206,16 +252,19 @@ pub fn finish_or_split(
     mapped: MappedChart,
     order: Order,
     settings: &decompose::Settings,
+    host: &dyn Host,
 ) -> Result<Vec<(Chart, CertifiedChart)>, SplitError> {
+    let pace = Pace::new(host);
     let mut finished = Vec::new();
     let mut waiting = vec![(chart, mapped)];
     while let Some((chart, mapped)) = waiting.pop() {
-        let done = finish_chart(mapped);
-        match split_if_stretched(mesh, &chart, &done.certified, settings)? {
+        let done = finish(mapped, host);
+        pace.end()?;
+        match split_if_stretched(mesh, &chart, &done.certified, settings, host)? {
             None => finished.push((chart, done)),
             Some(parts) => {
                 for part in parts.into_iter().rev() {
-                    waiting.extend(map_or_split(mesh, part, order, settings)?.into_iter().rev());
+                    waiting.extend(map_or_split(mesh, part, order, settings, host)?.into_iter().rev());
                 }
             }
         }
@@ -229,11 +278,12 @@ fn split_if_stretched(
     chart: &Chart,
     map: &CertifiedMap,
     settings: &decompose::Settings,
+    host: &dyn Host,
 ) -> Result<Option<Vec<Chart>>, decompose::Error> {
     if distortion::area_ratio(chart, map) <= settings.max_area_ratio {
         return Ok(None);
     }
-    decompose::split(mesh, chart, Some(&distortion::log_scales(chart, map)), settings)
+    decompose::split(mesh, chart, Some(&distortion::log_scales(chart, map)), settings, host)
 }
 
 /// The part of a map that is published: the chart without its fans.
@@ -253,13 +303,13 @@ mod tests {
         let settings = decompose::Settings { max_area_ratio: 5e5, feature_angle: None, ..Default::default() };
         let disk =
             decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk").into_charts().remove(0);
-        let parts = map_or_split(&mesh, disk, Order::Quadratic, &settings).expect("maps");
+        let parts = map_or_split(&mesh, disk, Order::Quadratic, &settings, &Alone).expect("maps");
         let [(chart, mapped)] = &parts[..] else { panic!("{} parts", parts.len()) };
         let ratio = |(chart, done): &(Chart, CertifiedChart)| distortion::area_ratio(chart, &done.certified);
         let whole = (chart.clone(), finish_chart(mapped.clone()));
         assert!(ratio(&whole) > settings.max_area_ratio, "neither linear nor harmonic map foretell it");
         let finished =
-            finish_or_split(&mesh, chart.clone(), mapped.clone(), Order::Quadratic, &settings).expect("maps");
+            finish_or_split(&mesh, chart.clone(), mapped.clone(), Order::Quadratic, &settings, &Alone).expect("maps");
         assert!(finished.len() > 1 && finished.iter().all(|f| ratio(f) <= settings.max_area_ratio));
         assert_eq!(finished.iter().map(|f| f.0.triangles().len()).sum::<usize>(), mesh.triangles().len());
     }

@@ -19,6 +19,11 @@
 //! resolution of doubles; then the error says so. Results depend on nothing but the arguments: there is no clock,
 //! no thread, no random number and no file in this crate.
 //!
+//! # Cancelling, taking turns, and memory
+//!
+//! Whatever can take long asks a [`host::Host`] many times a second whether to go on, and reserves memory from it before
+//! it factorises. [`host::Alone`] always goes on.
+//!
 //! # What is not
 //!
 //! The map is a local minimiser of the energy, within the maps whose jacobians have positive Bernstein coefficients.
@@ -29,11 +34,12 @@
 //! # Example
 //!
 //! ```
+//! use pipeline::host::Alone;
 //! use pipeline::{Order, decompose, finish_chart, map_chart, repair, shapes};
 //!
 //! let soup = shapes::disk(8);
 //! let surface = repair(&soup, &Default::default())?.mesh;
-//! let atlas = decompose(&surface, &Default::default())?;
+//! let atlas = decompose(&surface, &Default::default(), &Alone)?;
 //! for chart in atlas.charts() {
 //!     let done = finish_chart(map_chart(chart, Order::Quadratic)?);
 //!     let certificate = done.certified.certificate();
@@ -54,6 +60,7 @@ pub mod closed;
 pub mod element;
 mod elimination;
 pub mod grid;
+pub mod host;
 mod jacobian;
 pub mod mesh;
 pub mod shapes;

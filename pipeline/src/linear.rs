@@ -13,6 +13,7 @@
 use crate::boundary::Boundary;
 use crate::closed::ClosedChart;
 use crate::grid::{GridPoint, orientation};
+use crate::host::Host;
 use crate::id::{EdgeId, FaceId, HalfEdgeId};
 use crate::sparse::{self, Analysis, PRESCRIBED, Pattern};
 use crate::weights;
@@ -102,10 +103,10 @@ impl LinearMap {
 ///
 /// # Errors
 /// [`Error::Folded`] when the chart must be split; [`Error::Solver`].
-pub fn linear_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap, Error> {
+pub fn linear_map(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) -> Result<LinearMap, Error> {
     let unknowns = Unknowns::new(chart, boundary);
     let pattern = unknowns.pattern(chart);
-    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()? };
+    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, host };
     let harmonic = weights::harmonic(chart);
     let (places, mut folds) = attempt(&system, &harmonic)?;
     let count = folds.len();
@@ -128,7 +129,7 @@ pub fn linear_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap,
             return Ok(LinearMap { places, folded: count, edges_changed, method: Method::MMatrix });
         }
     }
-    let map = mean_value_map(chart, boundary)?;
+    let map = mean_value_map(chart, boundary, host)?;
     Ok(LinearMap { folded: count, ..map })
 }
 
@@ -151,8 +152,8 @@ fn attempt(system: &System, weights: &[f64]) -> Result<(Vec<GridPoint>, Vec<Face
 ///
 /// # Errors
 /// As [`linear_map`].
-pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary) -> Result<LinearMap, Error> {
-    let places = solve_mean_value(chart, boundary, &weights::mean_value(chart))?;
+pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) -> Result<LinearMap, Error> {
+    let places = solve_mean_value(chart, boundary, &weights::mean_value(chart), host)?;
     let folds = folded(chart, &places);
     match folds.first() {
         Some(first) => Err(Error::Folded { folded: folds.len(), first: *first }),
@@ -164,10 +165,10 @@ pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary) -> Result<Linear
 ///
 /// # Errors
 /// [`Error::Solver`].
-pub fn harmonic_places(chart: &ClosedChart, boundary: &Boundary) -> Result<Vec<GridPoint>, Error> {
+pub fn harmonic_places(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) -> Result<Vec<GridPoint>, Error> {
     let unknowns = Unknowns::new(chart, boundary);
     let pattern = unknowns.pattern(chart);
-    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()? };
+    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, host };
     Ok(system.solve(&weights::harmonic(chart))?)
 }
 
@@ -240,11 +241,12 @@ struct System<'a> {
     chart: &'a ClosedChart,
     unknowns: &'a Unknowns,
     analysis: Analysis<'a>,
+    host: &'a dyn Host,
 }
 
 impl System<'_> {
     fn solve(&self, weights: &[f64]) -> Result<Vec<GridPoint>, sparse::Error> {
-        let Self { chart, unknowns, analysis } = self;
+        let Self { chart, unknowns, analysis, host } = self;
         let mut values = analysis.pattern().zeros();
         let mut rhs = vec![0.0; 2 * unknowns.count];
         for (e, w) in weights.iter().enumerate() {
@@ -254,7 +256,7 @@ impl System<'_> {
             unknowns.pull(&mut rhs, unknowns.number[b], a, *w);
         }
         if unknowns.count > 0 {
-            analysis.factorise(&values)?.solve(&mut rhs, 2);
+            analysis.factorise(&values, *host)?.solve(&mut rhs, 2);
         }
         Ok(unknowns.places(&rhs))
     }
@@ -266,7 +268,12 @@ fn edge_ends(chart: &ClosedChart, edge: usize) -> [usize; 2] {
 }
 
 /// Solves for the places of the vertices with weights that differ between the ends of an edge.
-fn solve_mean_value(chart: &ClosedChart, boundary: &Boundary, weights: &[[f64; 2]]) -> Result<Vec<GridPoint>, Error> {
+fn solve_mean_value(
+    chart: &ClosedChart,
+    boundary: &Boundary,
+    weights: &[[f64; 2]],
+    host: &dyn Host,
+) -> Result<Vec<GridPoint>, Error> {
     let unknowns = Unknowns::new(chart, boundary);
     let mut entries = Vec::new();
     let mut rhs = vec![0.0; 2 * unknowns.count];
@@ -286,7 +293,7 @@ fn solve_mean_value(chart: &ClosedChart, boundary: &Boundary, weights: &[[f64; 2
     }
     entries.extend(row_sums.iter().enumerate().map(|(i, s)| (i as u32, i as u32, *s)));
     if unknowns.count > 0 {
-        sparse::solve_general(unknowns.count, &entries, &mut rhs, 2)?;
+        sparse::solve_general(unknowns.count, &entries, &mut rhs, 2, host)?;
     }
     Ok(unknowns.places(&rhs))
 }
@@ -323,6 +330,7 @@ pub fn lower_ears(chart: &ClosedChart, linear: &LinearMap, boundary: &mut Bounda
 mod tests {
     use super::*;
     use crate::boundary::Mids;
+    use crate::host::Alone;
     use crate::mesh::TriangleSoup;
     use crate::{bernstein, decompose, repair, shapes};
 
@@ -351,11 +359,11 @@ mod tests {
         for (i, soup) in shapes.iter().enumerate() {
             let chart = closed(soup);
             let mut boundary = Boundary::circle(&chart, Mids::Arc);
-            let linear = linear_map(&chart, &boundary).expect("maps");
+            let linear = linear_map(&chart, &boundary, &Alone).expect("maps");
             assert!(folded(&chart, linear.places()).is_empty());
             lower_ears(&chart, &linear, &mut boundary);
             assert!(valid(&chart, &linear.raised(&chart, &boundary)), "shape {i}");
-            let mean_value = mean_value_map(&chart, &boundary).expect("maps");
+            let mean_value = mean_value_map(&chart, &boundary, &Alone).expect("maps");
             assert!(folded(&chart, mean_value.places()).is_empty());
         }
     }
@@ -365,8 +373,8 @@ mod tests {
         for soup in [shapes::folding_three(), shapes::folding_six()] {
             let chart = closed(&soup);
             let boundary = Boundary::circle(&chart, Mids::Arc);
-            assert_eq!(folded(&chart, &harmonic_places(&chart, &boundary).expect("solves")).len(), 1);
-            let map = linear_map(&chart, &boundary).expect("maps");
+            assert_eq!(folded(&chart, &harmonic_places(&chart, &boundary, &Alone).expect("solves")).len(), 1);
+            let map = linear_map(&chart, &boundary, &Alone).expect("maps");
             assert_eq!((map.folded(), map.method()), (1, Method::MMatrix));
             assert!(map.edges_changed() > 0);
         }
@@ -376,7 +384,7 @@ mod tests {
     fn a_map_beyond_double_precision_is_refused() {
         let chart = closed(&shapes::finger(12, 22));
         let boundary = Boundary::circle(&chart, Mids::Arc);
-        let refused = linear_map(&chart, &boundary);
+        let refused = linear_map(&chart, &boundary, &Alone);
         assert!(matches!(refused, Err(Error::Folded { .. })), "area ratio e^88: {refused:?}");
     }
 }

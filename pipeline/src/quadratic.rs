@@ -11,6 +11,7 @@ use crate::closed::ClosedChart;
 use crate::element;
 use crate::elimination;
 use crate::grid::GridPoint;
+use crate::host::{Host, Pace};
 use crate::id::FaceId;
 use crate::jacobian::Corners;
 use crate::sparse::{self, PRESCRIBED, Pattern};
@@ -51,7 +52,8 @@ impl QuadraticMap {
 ///
 /// # Errors
 /// [`sparse::Error`] when the system cannot be factorised.
-pub fn quadratic_map(chart: &ClosedChart, boundary: &Boundary) -> Result<QuadraticMap, sparse::Error> {
+pub fn quadratic_map(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) -> Result<QuadraticMap, sparse::Error> {
+    let pace = Pace::new(host);
     let mut number = vec![0_u32; chart.node_count()];
     let mut uv = vec![[0.0; 2]; chart.node_count()];
     for (i, h) in chart.outer().iter().enumerate() {
@@ -68,11 +70,12 @@ pub fn quadratic_map(chart: &ClosedChart, boundary: &Boundary) -> Result<Quadrat
             unknowns += 1;
         }
     }
-    let solution = solve(chart, &number, &uv, unknowns as usize)?;
+    let solution = solve(chart, &number, &uv, unknowns as usize, &pace)?;
     for (node, n) in number.iter().enumerate().filter(|(_, n)| **n != PRESCRIBED) {
         uv[node] = [solution[*n as usize], solution[(unknowns + n) as usize]];
     }
     let nodes = to_grid(chart, &uv);
+    pace.after(chart.triangles().len())?;
     let invalid = invalid_triangles(chart, &nodes);
     // Of the solution itself: the grid ends not far outside the disk, and what was cut off there is no lower bound.
     let energy = energy_of(chart, &uv);
@@ -80,9 +83,16 @@ pub fn quadratic_map(chart: &ClosedChart, boundary: &Boundary) -> Result<Quadrat
 }
 
 /// Solves both Laplace problems; returns the unknown values of u, then those of v.
-fn solve(chart: &ClosedChart, number: &[u32], uv: &[[f64; 2]], unknowns: usize) -> Result<Vec<f64>, sparse::Error> {
+fn solve(
+    chart: &ClosedChart,
+    number: &[u32],
+    uv: &[[f64; 2]],
+    unknowns: usize,
+    pace: &Pace,
+) -> Result<Vec<f64>, sparse::Error> {
     let faces = 0..chart.triangles().len();
     let elements: Vec<[u32; 6]> = faces.clone().map(|f| chart.nodes(f).map(|n| number[n])).collect();
+    pace.after(elements.len())?;
     let pattern = Pattern::new(unknowns, &elements);
     let mut values = pattern.zeros();
     let mut rhs = vec![0.0; 2 * unknowns];
@@ -98,7 +108,8 @@ fn solve(chart: &ClosedChart, number: &[u32], uv: &[[f64; 2]], unknowns: usize) 
         }
     }
     if unknowns > 0 {
-        pattern.analyse_as_numbered()?.factorise(&values)?.solve(&mut rhs, 2);
+        pace.after(elements.len())?;
+        pattern.analyse_as_numbered()?.factorise(&values, pace.host)?.solve(&mut rhs, 2);
     }
     Ok(rhs)
 }
@@ -156,6 +167,7 @@ pub(crate) fn energies(chart: &ClosedChart, places: &[[f64; 2]]) -> impl Iterato
 mod tests {
     use super::*;
     use crate::boundary::Mids;
+    use crate::host::Alone;
     use crate::{decompose, linear, repair, shapes};
 
     #[test]
@@ -165,8 +177,8 @@ mod tests {
             &decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0],
         );
         let boundary = Boundary::circle(&chart, Mids::Arc);
-        let start = linear::linear_map(&chart, &boundary).expect("maps").raised(&chart, &boundary);
-        let map = quadratic_map(&chart, &boundary).expect("solves");
+        let start = linear::linear_map(&chart, &boundary, &Alone).expect("maps").raised(&chart, &boundary);
+        let map = quadratic_map(&chart, &boundary, &Alone).expect("solves");
         assert!(map.energy() < energy(&chart, &start));
         // Moving any node raises the energy: the map is the minimiser.
         for node in [20, chart.own_vertices() + 100, chart.own_nodes(), chart.node_count() - 1] {
@@ -183,7 +195,7 @@ mod tests {
             &decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0],
         );
         let boundary = Boundary::circle(&chart, Mids::Chord);
-        let map = quadratic_map(&chart, &boundary).expect("solves");
+        let map = quadratic_map(&chart, &boundary, &Alone).expect("solves");
         assert!(map.invalid().is_empty());
         // The start of the loop may be turned: distances from the centre are kept.
         for (v, p) in mesh.points().iter().enumerate() {

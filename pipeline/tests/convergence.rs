@@ -3,6 +3,7 @@
 use pipeline::boundary::Boundary;
 use pipeline::closed::ClosedChart;
 use pipeline::element::{basis, stiffness};
+use pipeline::host::Alone;
 use pipeline::linear::harmonic_places;
 use pipeline::quadratic::quadratic_map;
 use pipeline::space::{Vec3, midpoint, triangle_area};
@@ -36,8 +37,8 @@ fn errors(rings: u32) -> [f64; 2] {
     let vertices: Vec<_> = chart.outer().iter().map(|h| exact(ends(h)[0])).collect();
     let mids: Vec<_> = chart.outer().iter().map(|h| exact(midpoint(ends(h)[0], ends(h)[1]))).collect();
     let boundary = Boundary::through(&chart, &vertices, &mids).expect("one per node");
-    let linear = harmonic_places(&chart, &boundary).expect("solves");
-    let quadratic = quadratic_map(&chart, &boundary).expect("solves");
+    let linear = harmonic_places(&chart, &boundary, &Alone).expect("solves");
+    let quadratic = quadratic_map(&chart, &boundary, &Alone).expect("solves");
     let mut squares = [0.0; 2];
     for (f, t) in chart.triangles().iter().enumerate() {
         let corners = t.map(place);

@@ -225,6 +225,7 @@ mod tests {
     use crate::decompose::legality;
     use crate::decompose::patches::compact_cells;
     use crate::decompose::regions::Regions;
+    use crate::host::Alone;
     use crate::id::{ChartId, FaceId, VertexId};
     use crate::mesh::{Census, EdgeTable, SurfaceMesh, TriangleSoup, Umbrellas};
     use crate::repair::{Settings, repair};
@@ -265,7 +266,7 @@ mod tests {
         let soups = [shapes::sphere(8), shapes::disk_with_holes(17, 3), shapes::ring_torus(14, 9), shapes::moebius(20)];
         let meshes: Vec<SurfaceMesh> = soups.iter().chain([&shapes::finger(12, 2)]).map(surface).collect();
         for (mesh, count) in meshes.iter().flat_map(|m| [3, 7, 25, 60].map(|count| (m, count))) {
-            let dual = Dual::new(mesh);
+            let dual = Dual::new(mesh, &Alone);
             let cells = compact_cells(&dual, |_| count);
             let complex = Complex::new(&dual, &cells);
             let mut random = Random(count as u64);
@@ -294,7 +295,7 @@ mod tests {
     fn half_arcs_are_two_sides_of_arcs_and_go_round_their_cells() {
         for soup in [shapes::sphere(8), shapes::disk_with_holes(17, 3), shapes::ring_torus(14, 9)] {
             let mesh = surface(&soup);
-            let dual = Dual::new(&mesh);
+            let dual = Dual::new(&mesh, &Alone);
             for count in [1, 2, 9, 40] {
                 let complex = Complex::new(&dual, &compact_cells(&dual, |_| count));
                 for (a, arc) in complex.arcs.iter().enumerate() {

@@ -1,6 +1,7 @@
 //! The dual graph of a surface: triangles, joined where they share an edge along which both run consistently.
 
 use super::voronoi::Graph;
+use crate::host::{Cancelled, Host, Pace};
 use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;
 use crate::space::{Vec3, cross, distance, midpoint, sub};
@@ -21,6 +22,8 @@ struct Side {
 /// A surface as decomposition sees it. Lengths are in the unit of the metric.
 pub(super) struct Dual<'a> {
     pub mesh: &'a SurfaceMesh,
+    /// The host of what is computed on the surface.
+    pub pace: Pace<'a>,
     sides: Vec<Side>,
     /// Per edge 1 minus the cosine of its dihedral angle, at most 1, if it is a feature: no cell crosses it; else 0.
     pub sharpness: Vec<f64>,
@@ -35,7 +38,7 @@ pub(super) struct Dual<'a> {
 }
 
 impl<'a> Dual<'a> {
-    pub(super) fn new(mesh: &'a SurfaceMesh) -> Self {
+    pub(super) fn new(mesh: &'a SurfaceMesh, host: &'a dyn Host) -> Self {
         let scale = mesh.metric().scale;
         let points: Vec<Vec3> = mesh.points().iter().map(|p| p.map(|c| c * scale)).collect();
         let triangles = mesh.triangles();
@@ -55,11 +58,17 @@ impl<'a> Dual<'a> {
             steps: Vec::new(),
             foes: BTreeMap::new(),
             mesh,
+            pace: Pace::new(host),
             points,
         };
         made.foes = made.find_foes();
         made.steps = made.half_edges().map(|h| made.step(h)).collect();
         made
+    }
+
+    /// A safe point, after all triangles were looked at.
+    pub(super) fn visited_all(&self) -> Result<(), Cancelled> {
+        self.pace.after(self.areas.len())
     }
 
     fn find_foes(&self) -> BTreeMap<HalfEdgeId, Vec<FaceId>> {

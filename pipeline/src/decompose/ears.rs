@@ -142,6 +142,7 @@ impl Work {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::host::Alone;
     use crate::mesh::TriangleSoup;
     use crate::{Order, decompose, finish_chart, map_chart, repair};
 
@@ -160,7 +161,7 @@ mod tests {
     fn ears_are_split_and_the_surface_stays() {
         for (n, ears) in [(1, 1), (2, 2), (5, 2)] {
             let mesh = repair(&square(n), &Default::default()).expect("a surface").mesh;
-            let atlas = decompose(&mesh, &Default::default()).expect("one chart");
+            let atlas = decompose(&mesh, &Default::default(), &Alone).expect("one chart");
             let done = split_ears(&mesh, &atlas, usize::MAX).expect("legal").expect("ears");
             assert_eq!((done.split, done.mesh.points().len()), (ears, mesh.points().len() + ears));
             assert!((done.mesh.area() / mesh.area() - 1.0).abs() < 1e-14);

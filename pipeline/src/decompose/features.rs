@@ -9,6 +9,7 @@
 
 use super::Settings;
 use super::dual::Dual;
+use crate::host::{Cancelled, Host};
 use crate::id::HalfEdgeId;
 use crate::mesh::SurfaceMesh;
 use crate::space::{Vec3, dot, norm};
@@ -40,10 +41,16 @@ const LEAST_WIDTH: f64 = 0.005;
 const BLUNT: f64 = 0.5;
 
 /// The dual graph of a surface with its feature edges marked, and their number.
-pub(super) fn with_features<'a>(mesh: &'a SurfaceMesh, settings: &Settings) -> (Dual<'a>, usize) {
-    let mut dual = Dual::new(mesh);
+pub(super) fn with_features<'a>(
+    mesh: &'a SurfaceMesh,
+    settings: &Settings,
+    host: &'a dyn Host,
+) -> Result<(Dual<'a>, usize), Cancelled> {
+    let mut dual = Dual::new(mesh, host);
+    dual.visited_all()?;
     let count = settings.feature_angle.map_or(0, |angle| mark_features(&mut dual, angle));
-    (dual, count)
+    dual.visited_all()?;
+    Ok((dual, count))
 }
 
 /// Marks the feature edges of `dual`: dihedral angle above `angle` degrees. Returns their number.
@@ -67,7 +74,7 @@ fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     }
     let kept: Vec<HalfEdgeId> = kept.into_iter().map(|k| k.0).collect();
     // Every time some patches are united with others, so that fewer are left.
-    while drop_small_patches(dual, &kept) {}
+    while dual.visited_all().is_ok() && drop_small_patches(dual, &kept) {}
     drop_dangling(dual, &kept);
     dual.sharpness.iter().filter(|s| **s > 0.0).count()
 }

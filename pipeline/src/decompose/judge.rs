@@ -20,8 +20,11 @@ pub(super) struct Verdict {
     pub outer: HalfEdgeId,
 }
 
-/// The prediction for every label (none for labels without triangles).
+/// The prediction for every label (none for labels without triangles, nor where nobody waits for it any more).
 pub(super) fn judge(network: &Network, cells: &Cells) -> Vec<Option<Verdict>> {
+    if network.dual.visited_all().is_err() {
+        return vec![None; network.label_count()];
+    }
     let (cut, labels) = cut(network, cells);
     let complex = Complex::new(network.dual, &cut);
     let graph = CellGraph::new(&complex);

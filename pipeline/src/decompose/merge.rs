@@ -1,8 +1,9 @@
 //! Growing charts: starting from a few dozen compact regions, the best pair of neighbours is united again and
 //! again, as long as unions are legal and not too distorted.
 
-use super::predict::{CellGraph, area_ratio};
+use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
 use super::regions::{Regions, Shape, Union};
+use crate::host::{Cancelled, Pace};
 use crate::space::norm;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -72,12 +73,13 @@ pub(super) struct Merge<'a, 'b> {
     pub groups: Vec<u32>,
     /// Features block unions, but not that of a region around which there is no more of them, weighed by sharpness.
     pub least_outline: f64,
+    pub pace: &'b Pace<'b>,
 }
 
 impl Merge<'_, '_> {
     /// Unites neighbours until no union is allowed. Ends because every union leaves one region less, and every
     /// candidate is judged once.
-    pub(super) fn run(&mut self) {
+    pub(super) fn run(&mut self) -> Result<(), Cancelled> {
         let mut version = vec![0_u32; self.regions.all.len()];
         let mut heap = BinaryHeap::new();
         for a in 0..version.len() as u32 {
@@ -92,6 +94,8 @@ impl Merge<'_, '_> {
             }
             let Some(ratio) = best.ratio else {
                 heap.extend(self.judged(best));
+                let cells = [a, b].map(|r| self.regions.all[r as usize].cells.len());
+                self.pace.after(WORK_PER_CELL * (cells[0] + cells[1]))?;
                 continue;
             };
             let Some(union) = self.regions.union(a, b) else { continue };
@@ -103,6 +107,7 @@ impl Merge<'_, '_> {
                 heap.extend(self.candidate((a.min(c), a.max(c)), &version));
             }
         }
+        Ok(())
     }
 
     /// A legal union. Its ratio is not known yet: it is taken to be that of its parts, as solving for it costs most,

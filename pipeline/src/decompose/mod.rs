@@ -43,6 +43,7 @@ mod straighten;
 mod voronoi;
 
 use crate::atlas::Atlas;
+use crate::host::{Cancelled, Host};
 use crate::id::HalfEdgeId;
 use crate::mesh::SurfaceMesh;
 pub use assemble::assemble;
@@ -61,12 +62,21 @@ use split::legal;
 pub use split::split;
 use voronoi::{Cells, bisect_until};
 
-/// Why a surface has no atlas: a fault of planish, as every surface has one.
+/// Why a surface has no atlas. Every surface has one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// A chart came out that is none.
+    /// A chart came out that is none: a fault of planish.
     #[error(transparent)]
     Illegal(#[from] Illegal),
+    /// The atlas was not wanted any more.
+    #[error("the decomposition was cancelled")]
+    Cancelled,
+}
+
+impl From<Cancelled> for Error {
+    fn from(Cancelled: Cancelled) -> Self {
+        Self::Cancelled
+    }
 }
 
 /// What charts must respect.
@@ -93,18 +103,19 @@ impl Default for Settings {
 ///
 /// # Errors
 /// [`Error`].
-pub fn decompose(mesh: &SurfaceMesh, settings: &Settings) -> Result<Atlas, Error> {
-    let (dual, features) = with_features(mesh, settings);
+pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, host: &dyn Host) -> Result<Atlas, Error> {
+    let (dual, features) = with_features(mesh, settings, host)?;
     let limits = Limits::new(settings);
-    let (cells, complex) = cells(&dual, &limits);
+    let (cells, complex) = cells(&dual, &limits)?;
     let graph = CellGraph::new(&complex);
-    let search = Search { complex: &complex, graph: &graph, limits, bound: settings.max_area_ratio };
+    let search = Search { complex: &complex, graph: &graph, limits, bound: settings.max_area_ratio, pace: &dual.pace };
     let choice = Choice { dual: &dual, cells: &cells, limits, bound: settings.max_area_ratio };
-    let charts = choice.of(&search.run());
-    let charts = search.absorb(charts, least_outline(&dual));
+    let charts = choice.of(&search.run()?)?;
+    let charts = search.absorb(charts, least_outline(&dual))?;
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
     let size = |h: HalfEdgeId| graph.area(cells.of[h.face().index()]).sqrt();
     let atlas = finish(&dual, labels, limits, settings, &cells, size)?;
+    dual.pace.end()?;
     Ok(Atlas { feature_edges: features, ..atlas })
 }
 
@@ -119,14 +130,16 @@ impl Limits {
 }
 
 /// Legal cells of about the same size, and their complex.
-fn cells(dual: &Dual, limits: &Limits) -> (Cells, Complex) {
+fn cells(dual: &Dual, limits: &Limits) -> Result<(Cells, Complex), Cancelled> {
     let cells = compact_cells(dual, |size| (size / 8).min(CELLS));
+    dual.visited_all()?;
     let mut complex = Complex::default();
     let cells = bisect_until(dual, cells, |cells| {
         complex = Complex::new(dual, cells);
-        legal(&complex, limits)
+        legal(dual, &complex, limits)
     });
-    (cells, complex)
+    dual.visited_all()?;
+    Ok((cells, complex))
 }
 
 /// Charts grow up to this share of the decades of the largest area ratio: the prediction is not exact, and straight

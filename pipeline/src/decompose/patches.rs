@@ -132,13 +132,14 @@ mod tests {
     use super::*;
     use crate::decompose::dual::Dual;
     use crate::decompose::voronoi::farthest_first;
+    use crate::host::Alone;
     use crate::mesh::TriangleSoup;
     use crate::repair::{Settings, repair};
     use crate::shapes;
 
     fn check(soup: &TriangleSoup, wanted: usize) {
         let mesh = repair(soup, &Settings::default()).expect("a surface is left").mesh;
-        let dual = Dual::new(&mesh);
+        let dual = Dual::new(&mesh, &Alone);
         for cells in [compact_cells(&dual, |_| wanted), farthest_first(&dual, |_| wanted)] {
             let mut seen = vec![false; dual.len()];
             let mut found = vec![false; cells.count];
@@ -173,7 +174,7 @@ mod tests {
     #[test]
     fn cells_of_one_size_on_an_even_plate() {
         let mesh = repair(&shapes::flat_disk(60), &Settings::default()).expect("a surface is left").mesh;
-        let cells = compact_cells(&Dual::new(&mesh), |_| 50);
+        let cells = compact_cells(&Dual::new(&mesh, &Alone), |_| 50);
         let mut sizes = vec![0; cells.count];
         cells.of.iter().for_each(|c| sizes[*c as usize] += 1);
         let mean = mesh.triangles().len() / 50;

@@ -126,6 +126,9 @@ impl Graph for CellGraph {
     }
 }
 
+/// The work of foretelling a ratio, per cell: as long as so many triangles are looked at.
+pub(super) const WORK_PER_CELL: usize = 20;
+
 /// Parts of this many cells are not dissected.
 const FEW: usize = 6;
 

@@ -6,10 +6,11 @@
 
 use super::complex::{Complex, NONE};
 use super::merge::{Limits, Merge, Weights};
-use super::predict::{CellGraph, area_ratio};
+use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
 use super::regions::{Outline, Region, Regions};
 use super::sides::{Axes, axes, faces};
 use super::voronoi::{Cells, bisect_until, farthest_first};
+use crate::host::{Cancelled, Pace};
 
 const BALANCED: Weights = Weights { ratio: 1.0, roundness: 0.6, spread: 0.5, shared: 0.0 };
 const COMPACT: Weights = Weights { ratio: 0.5, roundness: 0.6, spread: 0.5, shared: 1.0 };
@@ -51,6 +52,7 @@ pub(super) struct Search<'a> {
     pub limits: Limits,
     /// The largest area ratio of a chart.
     pub bound: f64,
+    pub pace: &'a Pace<'a>,
 }
 
 /// A component is left whole up to this share of the largest area ratio: it has no seams that would change it.
@@ -87,7 +89,7 @@ impl Found {
 }
 
 impl Search<'_> {
-    pub(super) fn run(&self) -> Found {
+    pub(super) fn run(&self) -> Result<Found, Cancelled> {
         let components = farthest_first(self.graph, |_| 1);
         let whole = Regions::new(self.complex, components.of.clone(), components.count);
         let whole = self.fine(whole, WHOLE * self.bound);
@@ -96,7 +98,7 @@ impl Search<'_> {
         let mut ranked: Vec<Vec<(Score, usize)>> = whole.iter().map(left_whole).collect();
         let axes = axes(self.complex, &components);
         for way in WAYS.iter().filter(|_| whole.contains(&false)) {
-            let (of, scores) = self.grow(way, &components, &axes, &whole);
+            let (of, scores) = self.grow(way, &components, &axes, &whole)?;
             for (ranked, score) in ranked.iter_mut().zip(scores).zip(&whole).filter(|(_, w)| !**w).map(|(r, _)| r) {
                 ranked.push((score, ways.len()));
             }
@@ -106,21 +108,28 @@ impl Search<'_> {
             a.0.charts.cmp(&b.0.charts).then(a.0.beauty.total_cmp(&b.0.beauty)).then(a.1.cmp(&b.1))
         };
         ranked.iter_mut().for_each(|r| r.sort_by(order));
-        Found { components, ranked, ways }
+        Ok(Found { components, ranked, ways })
     }
 
-    /// Per region, whether it may be a chart with at most this area ratio.
+    /// Per region, whether it may be a chart with at most this area ratio; all, where nobody waits for it any more.
     fn fine(&self, mut regions: Regions, largest: f64) -> Vec<bool> {
         let outlines: Vec<_> = (0..regions.all.len() as u32).map(|r| regions.outline_of(r)).collect();
         let judge = |(region, outline): (&Region, &Outline)| {
             let ratio = || area_ratio(self.complex, self.graph, &region.cells, &outline.loops).0;
-            self.limits.allow(&regions.shape(region, outline)) && ratio() <= largest
+            let allowed = || self.limits.allow(&regions.shape(region, outline)) && ratio() <= largest;
+            !self.pace.goes_on(WORK_PER_CELL * region.cells.len()) || allowed()
         };
         regions.all.iter().zip(&outlines).map(judge).collect()
     }
 
     /// Grows charts one way: per cell its chart, and the score of every component.
-    fn grow(&self, way: &Way, components: &Cells, axes: &[Axes], whole: &[bool]) -> (Vec<u32>, Vec<Score>) {
+    fn grow(
+        &self,
+        way: &Way,
+        components: &Cells,
+        axes: &[Axes],
+        whole: &[bool],
+    ) -> Result<(Vec<u32>, Vec<Score>), Cancelled> {
         let is_whole = |cell: usize| whole[components.of[cell] as usize];
         let groups = farthest_first(self.graph, |part| if is_whole(part[0]) { 1 } else { way.regions });
         let groups = bisect_until(self.graph, groups, |groups| {
@@ -136,23 +145,31 @@ impl Search<'_> {
         let rounds: Vec<Vec<u32>> = way.axis.map(side).into_iter().chain([wholes]).collect();
         let mut ratios = vec![1.0; groups.count];
         for groups in rounds {
-            let (graph, limits, weights) = (self.graph, self.limits, way.weights);
-            Merge { regions: &mut regions, graph, limits, weights, ratios: &mut ratios, groups, least_outline: 0.0 }
-                .run();
+            self.merge(&mut regions, &mut ratios, groups, way.weights, 0.0)?;
         }
         let scores = self.scores(&regions, &ratios, components);
-        (regions.of_cell, scores)
+        Ok((regions.of_cell, scores))
     }
 
     /// Unites charts across features wherever these are not sharp and long enough to part them, whatever their
     /// component.
-    pub(super) fn absorb(&self, charts: Cells, least_outline: f64) -> Cells {
+    pub(super) fn absorb(&self, charts: Cells, least_outline: f64) -> Result<Cells, Cancelled> {
         let count = charts.count;
         let mut regions = Regions::new(self.complex, charts.of, count);
-        let (graph, limits, weights) = (self.graph, self.limits, BALANCED);
-        let (mut ratios, groups) = (vec![1.0; count], vec![0; count]);
-        Merge { regions: &mut regions, graph, limits, weights, ratios: &mut ratios, groups, least_outline }.run();
-        Cells::renumbered(regions.of_cell)
+        self.merge(&mut regions, &mut vec![1.0; count], vec![0; count], BALANCED, least_outline)?;
+        Ok(Cells::renumbered(regions.of_cell))
+    }
+
+    fn merge(
+        &self,
+        regions: &mut Regions,
+        ratios: &mut [f64],
+        groups: Vec<u32>,
+        weights: Weights,
+        least_outline: f64,
+    ) -> Result<(), Cancelled> {
+        let (graph, limits, pace) = (self.graph, self.limits, self.pace);
+        Merge { regions, graph, limits, weights, ratios, groups, least_outline, pace }.run()
     }
 
     /// The score of every component.

@@ -102,7 +102,8 @@ impl Tree {
     }
 
     /// Grows the tree from `from`: Dijkstra, and on the way to one vertex ordered by the distance with what is left at
-    /// least (A*: Hart, Nilsson and Raphael 1968, doi 10.1109/TSSC.1968.300136). Ends because distances only fall.
+    /// least (A*: Hart, Nilsson and Raphael 1968, doi 10.1109/TSSC.1968.300136). Ends because distances only fall,
+    /// and early where nobody waits for paths any more.
     pub(super) fn grow(&mut self, network: &Network, from: usize, bounds: &Bounds) {
         let ahead = |tree: &Self, v: usize| match bounds.goal {
             Goal::Vertex(_) => tree.left(network.dual, bounds, v),
@@ -115,6 +116,9 @@ impl Tree {
             let so_far = self.known[node].distance;
             if sum > so_far + ahead(self, node) {
                 continue;
+            }
+            if !network.dual.pace.goes_on(1) {
+                return;
             }
             self.settled.push(node);
             if node != from && bounds.goal.is_at(network, node) {
@@ -223,6 +227,7 @@ impl Bounds<'_> {
 mod tests {
     use super::*;
     use crate::decompose::merge::Limits;
+    use crate::host::Alone;
     use crate::repair::{Settings, repair};
     use crate::shapes::{self, Random};
 
@@ -252,7 +257,7 @@ mod tests {
     #[test]
     fn bounds_do_not_hide_the_shortest_ways() {
         let mesh = repair(&shapes::bent_disk(16, 0.3, 0.2), &Settings::default()).expect("a surface is left").mesh;
-        let dual = Dual::new(&mesh);
+        let dual = Dual::new(&mesh, &Alone);
         let limits = Limits { area_ratio: 1e6, triangles: usize::MAX, strict_disks: false };
         let network = Network::new(&dual, vec![0; mesh.triangles().len()], limits);
         let inner: Vec<usize> = (0..mesh.points().len()).filter(|v| !network.is_open(*v)).collect();
@@ -268,7 +273,7 @@ mod tests {
     #[test]
     fn a_star_finds_what_dijkstra_finds() {
         let mesh = repair(&shapes::bent_disk(16, 0.3, 0.2), &Settings::default()).expect("a surface is left").mesh;
-        let dual = Dual::new(&mesh);
+        let dual = Dual::new(&mesh, &Alone);
         let limits = Limits { area_ratio: 1e6, triangles: usize::MAX, strict_disks: false };
         let network = Network::new(&dual, vec![0; mesh.triangles().len()], limits);
         let band = vec![true; mesh.points().len()];

@@ -12,6 +12,7 @@ use super::regions::Regions;
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
+use crate::host::Host;
 use crate::id::{FaceId, HalfEdgeId};
 use crate::mesh::SurfaceMesh;
 use crate::union_find::UnionFind;
@@ -26,24 +27,26 @@ const OFF_CENTRE: f64 = 3.0;
 /// `log_scale` is the logarithm of the area scale of each triangle, where the chart has a map.
 ///
 /// # Errors
-/// [`Error::Illegal`]: a fault of planish.
+/// [`Error::Illegal`]: a fault of planish; [`Error::Cancelled`].
 pub fn split(
     mesh: &SurfaceMesh,
     chart: &Chart,
     log_scale: Option<&[f64]>,
     settings: &Settings,
+    host: &dyn Host,
 ) -> Result<Option<Vec<Chart>>, Error> {
     if chart.triangles().len() < 2 {
         return Ok(None);
     }
     let part = mesh.part(chart);
-    let (dual, _) = with_features(&part, settings);
+    let (dual, _) = with_features(&part, settings, host)?;
     let limits = Limits::new(settings);
     let by_scale = log_scale.and_then(|s| across_protrusion(&dual, s, &limits));
     let labels = by_scale.unwrap_or_else(|| halves(&dual, &limits));
-    let (cells, _) = cells(&dual, &limits);
+    let (cells, _) = cells(&dual, &limits)?;
     let size = dual.total_area() / cells.count as f64;
     let pieces = finish(&dual, labels, limits, settings, &cells, |_| size.sqrt())?;
+    dual.pace.end()?;
     let on_surface = |piece: &Chart| Chart {
         id: chart.id,
         vertices: piece.vertices.iter().map(|v| chart.vertices[v.index()]).collect(),
@@ -55,12 +58,15 @@ pub fn split(
 
 /// Two parts of about the same size; more where these are no charts.
 fn halves(dual: &Dual, limits: &Limits) -> Vec<u32> {
-    bisect_until(dual, farthest_first(dual, |_| 2), |groups| legal(&Complex::new(dual, groups), limits)).of
+    bisect_until(dual, farthest_first(dual, |_| 2), |groups| legal(dual, &Complex::new(dual, groups), limits)).of
 }
 
-/// Per cell, whether it may be a chart.
-pub(super) fn legal(complex: &Complex, limits: &Limits) -> Vec<bool> {
+/// Per cell, whether it may be a chart. A safe point: all may be where nobody waits for charts any more.
+pub(super) fn legal(dual: &Dual, complex: &Complex, limits: &Limits) -> Vec<bool> {
     let count = complex.cells.len();
+    if dual.visited_all().is_err() {
+        return vec![true; count];
+    }
     let mut regions = Regions::new(complex, (0..count as u32).collect(), count);
     let outlines: Vec<_> = (0..count as u32).map(|r| regions.outline_of(r)).collect();
     let shapes = regions.all.iter().zip(&outlines).map(|(region, outline)| regions.shape(region, outline));
@@ -76,7 +82,7 @@ fn across_protrusion(dual: &Dual, log_scale: &[f64], limits: &Limits) -> Option<
         let labels = below(dual, log_scale, low + level * (high - low))?;
         let groups = Cells { of: labels, count: 2 };
         let cost = cut_length(dual, &groups.of) * (1.0 + OFF_CENTRE * (level - 0.5).abs());
-        legal(&Complex::new(dual, &groups), limits).iter().all(|l| *l).then_some((cost, groups.of))
+        legal(dual, &Complex::new(dual, &groups), limits).iter().all(|l| *l).then_some((cost, groups.of))
     };
     let cuts = LEVELS.iter().filter_map(|level| cut(*level));
     cuts.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, labels)| labels)

@@ -6,6 +6,7 @@ use super::problem::{Cell, Problem};
 use super::{Effort, on_grid, places, region};
 use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
+use crate::host::Pace;
 use crate::quadratic::energies;
 use crate::sparse::Error;
 
@@ -22,13 +23,19 @@ const TOLERANCE: f64 = 1e-9;
 /// The share of its value in the start that every coefficient keeps.
 const KEPT: f64 = 1e-3;
 
-/// Descends from `start`; `None` where the systems are too large or cannot be factorised.
-pub(super) fn untangle(chart: &ClosedChart, start: &[GridPoint], effort: &mut Effort) -> Option<Vec<GridPoint>> {
+/// Descends from `start`; `None` where the systems are too large or cannot be factorised, or nobody waits any more.
+pub(super) fn untangle(
+    chart: &ClosedChart,
+    start: &[GridPoint],
+    effort: &mut Effort,
+    pace: &Pace,
+) -> Option<Vec<GridPoint>> {
+    pace.after(chart.triangles().len()).ok()?;
     let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
     let mut all = places(start, &centres);
     let energies: Vec<f64> = energies(chart, &all).collect();
     let mean = energies.iter().sum::<f64>() / chart.own_triangles() as f64;
-    let mut problem = problem(chart, &energies, mean);
+    let mut problem = problem(chart, &energies, mean, pace);
     let mut x = problem.gather(&all);
     problem
         .for_each_bound(&x, |c, bound| *bound = Bound { scale: c, floor: KEPT * c, weight: bound.weight, dual: None });
@@ -43,14 +50,14 @@ fn unset(weight: f64) -> Bound {
 
 /// All triangles, with weights proportional to their energies but bounds still unset; every node may move but those
 /// of the outer loop.
-fn problem<'a>(chart: &'a ClosedChart, energies: &[f64], mean: f64) -> Problem<'a> {
+fn problem<'a>(chart: &'a ClosedChart, energies: &[f64], mean: f64, pace: &'a Pace) -> Problem<'a> {
     let own = chart.own_triangles() as u32;
     let bounds = |face: u32| (face < own).then(|| [unset(energies[face as usize].max(1e-6 * mean)); 6]);
     let cells = (0..chart.triangles().len() as u32).map(|face| Cell { face, bounds: bounds(face) }).collect();
     let fixed = region::fixed_nodes(chart);
     let centres = chart.node_count()..chart.node_count() + chart.loops().len();
     let free: Vec<u32> = (0..fixed.len()).filter(|n| !fixed[*n]).chain(centres).map(|n| n as u32).collect();
-    Problem::new(chart, cells, region::arc_cells(chart, |_| true, unset(mean)), &free)
+    Problem::new(chart, cells, region::arc_cells(chart, |_| true, unset(mean)), &free, pace)
 }
 
 /// Minimises with falling weights.
@@ -59,6 +66,7 @@ fn descend(problem: &mut Problem, x: &mut super::Places, effort: &mut Effort) ->
         return Ok(());
     }
     let pattern = problem.pattern();
+    problem.visited_all()?;
     let analysis = pattern.analyse()?;
     let steps = (WORK / problem.cells.len()).clamp(STEPS[0], STEPS[1]);
     let mut last = 1.0;

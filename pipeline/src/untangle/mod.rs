@@ -29,6 +29,7 @@ mod terms;
 use crate::certify::{Arc, star_centre};
 use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
+use crate::host::{Host, Pace};
 use crate::quadratic::{self, QuadraticMap, energy, invalid_triangles};
 use problem::Places;
 
@@ -105,10 +106,11 @@ impl Effort {
     }
 }
 
-/// Untangles the harmonic map of `chart`; `start` is the valid raised linear map with the same boundary.
-pub fn untangle(chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap) -> Untangled {
+/// Untangles the harmonic map of `chart`; `start` is the valid raised linear map with the same boundary, and the result
+/// where nobody waits for a better one any more.
+pub fn untangle(chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap, host: &dyn Host) -> Untangled {
     let mut effort = Effort::default();
-    let (method, nodes, hole_centres) = best(chart, start, harmonic, &mut effort);
+    let (method, nodes, hole_centres) = best(chart, start, harmonic, &mut effort, &Pace::new(host));
     let report = Report {
         method,
         iterations: effort.iterations,
@@ -127,18 +129,19 @@ fn best(
     start: &[GridPoint],
     harmonic: &QuadraticMap,
     effort: &mut Effort,
+    pace: &Pace,
 ) -> (Method, Vec<GridPoint>, Vec<GridPoint>) {
     if let Some(centres) = valid(chart, harmonic.nodes()) {
         return (Method::Harmonic, harmonic.nodes().to_vec(), centres);
     }
     if harmonic.invalid().len() as f64 <= FEW * chart.own_triangles() as f64 {
-        let nodes = patch::untangle(chart, start, harmonic, effort);
+        let nodes = patch::untangle(chart, start, harmonic, effort, pace);
         if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
             return (Method::Patch, nodes.unwrap_or_default(), centres);
         }
     }
     effort.decrement = 0.0;
-    let nodes = feasible::untangle(chart, start, effort);
+    let nodes = feasible::untangle(chart, start, effort, pace);
     if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
         return (Method::Feasible, nodes.unwrap_or_default(), centres);
     }

@@ -12,6 +12,7 @@ use super::{Effort, arc, centre_of_hole, places, terms};
 use crate::bernstein::{ExactDet, Validity};
 use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
+use crate::host::Pace;
 use crate::id::{HalfEdgeId, VertexId};
 use crate::mesh::Stars;
 use crate::quadratic::{QuadraticMap, det, invalid_triangles, node_to_grid};
@@ -39,17 +40,19 @@ const STEPS_PER_WEIGHT: usize = 10;
 /// A weight is left when the promised decrease falls below this share of the patch's energy.
 const TOLERANCE: f64 = 1e-10;
 
-/// Untangles patch by patch; `None` where some patch does not yield.
+/// Untangles patch by patch; `None` where some patch does not yield, or nobody waits any more.
 pub(super) fn untangle(
     chart: &ClosedChart,
     start: &[GridPoint],
     harmonic: &QuadraticMap,
     effort: &mut Effort,
+    pace: &Pace,
 ) -> Option<Vec<GridPoint>> {
-    let setting = Setting::new(chart, start);
+    let setting = Setting::new(chart, start, pace);
     let mut nodes = harmonic.nodes().to_vec();
     let mut x = harmonic.places().to_vec();
     for rings in RINGS {
+        pace.after(chart.triangles().len()).ok()?;
         let centres: Vec<_> = (0..chart.loops().len()).map(|k| centre_of_hole(chart, &nodes, k)).collect();
         let seeds = seeds(chart, &nodes, &centres);
         if seeds.is_empty() {
@@ -63,6 +66,7 @@ pub(super) fn untangle(
             return None;
         }
         for faces in &patches.parts {
+            pace.after(faces.len()).ok()?;
             let weight = |v: usize| 1.5 * (1.0 - f64::from(patches.distance[v]) / rings as f64);
             for (n, p) in setting.solve(faces, &x, weight, effort).unwrap_or_default() {
                 x[n] = p;
@@ -96,10 +100,11 @@ struct Setting<'a> {
     start: Places,
     /// Per node, whether it lies on the outer loop.
     fixed: Vec<bool>,
+    pace: &'a Pace<'a>,
 }
 
 impl<'a> Setting<'a> {
-    fn new(chart: &'a ClosedChart, start: &[GridPoint]) -> Self {
+    fn new(chart: &'a ClosedChart, start: &[GridPoint], pace: &'a Pace) -> Self {
         let stars = Stars::new(chart.triangles(), chart.vertex_count());
         let in_plane = |f: usize| det(chart, start, f).coefficients().iter().sum::<f64>() / 6.0;
         let plane: Vec<f64> = (0..chart.triangles().len()).map(in_plane).collect();
@@ -111,7 +116,7 @@ impl<'a> Setting<'a> {
         };
         let density = (0..plane.len()).map(density).collect();
         let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-        Self { chart, stars, density, start: places(start, &centres), fixed: region::fixed_nodes(chart) }
+        Self { chart, stars, density, start: places(start, &centres), fixed: region::fixed_nodes(chart), pace }
     }
 
     /// Untangles one patch of the map `x` (all nodes and star centres), begun between `x` and the feasible start by
@@ -183,7 +188,7 @@ impl<'a> Setting<'a> {
             let scale = terms::arc_products(&arc.nodes.map(|n| self.start[n as usize]));
             (0..3).for_each(|k| arc.bounds[k].scale = scale[k]);
         }
-        Problem::new(self.chart, cells, arcs, &free)
+        Problem::new(self.chart, cells, arcs, &free, self.pace)
     }
 }
 
@@ -191,6 +196,7 @@ impl<'a> Setting<'a> {
 /// or its systems cannot be solved.
 fn relax(problem: &mut Problem, x: &mut Places, effort: &mut Effort) -> Option<()> {
     let pattern = problem.pattern();
+    problem.visited_all().ok()?;
     let analysis = pattern.analyse().ok()?;
     problem.scale_weights(PULL);
     let mut least = problem.least(x);

@@ -4,8 +4,12 @@ use super::penalty::{Bound, Penalty, Value};
 use super::terms::{self, Form, Four};
 use crate::closed::ClosedChart;
 use crate::element;
+use crate::host::{Cancelled, Pace};
 use crate::jacobian::{Corners, Six};
-use crate::sparse::{Error, PRESCRIBED, Pattern};
+use crate::sparse::{Analysis, Error, PRESCRIBED, Pattern};
+
+/// The work of a triangle: as long as so many are looked at elsewhere.
+const WORK_PER_CELL: usize = 4;
 
 /// Places of nodes.
 pub(super) type Places = Vec<[f64; 2]>;
@@ -26,6 +30,7 @@ pub(super) struct ArcCell {
 /// own, so that a small region costs little, however large the chart is.
 pub(super) struct Problem<'a> {
     chart: &'a ClosedChart,
+    pace: &'a Pace<'a>,
     pub cells: Vec<Cell>,
     pub arcs: Vec<ArcCell>,
     /// The nodes of the region in the numbering of the chart (star centres after all others), ascending.
@@ -47,7 +52,7 @@ pub(super) struct Model {
 impl<'a> Problem<'a> {
     /// The problem on `cells` and `arcs`, of whose nodes those in `free` may move; nodes as numbered in the chart,
     /// star centres after all others.
-    pub fn new(chart: &'a ClosedChart, cells: Vec<Cell>, mut arcs: Vec<ArcCell>, free: &[u32]) -> Self {
+    pub fn new(chart: &'a ClosedChart, cells: Vec<Cell>, mut arcs: Vec<ArcCell>, free: &[u32], pace: &'a Pace) -> Self {
         let six = |cell: &Cell| chart.nodes(cell.face as usize).map(|n| n as u32);
         let mut nodes: Vec<u32> = cells.iter().flat_map(six).chain(arcs.iter().flat_map(|a| a.nodes)).collect();
         nodes.sort_unstable();
@@ -58,7 +63,12 @@ impl<'a> Problem<'a> {
         let free: Vec<u32> = free.iter().map(|n| local(*n)).collect();
         let mut number = vec![PRESCRIBED; nodes.len()];
         free.iter().enumerate().for_each(|(i, n)| number[*n as usize] = i as u32);
-        Self { chart, cells, arcs, nodes, of_cell, free, number }
+        Self { chart, pace, cells, arcs, nodes, of_cell, free, number }
+    }
+
+    /// A safe point, after all triangles of the region were looked at.
+    pub fn visited_all(&self) -> Result<(), Cancelled> {
+        self.pace.after(WORK_PER_CELL * self.cells.len())
     }
 
     /// The nodes of the region, as numbered in the chart, ascending.
@@ -269,13 +279,13 @@ fn add_outer(gradient: &mut [f64; 12], hessian: &mut [[f64; 12]; 12], terms: &[(
 /// Newton's step: minus the inverse Hessian times the gradient. Where rounding makes the Hessian singular its
 /// diagonal is raised, a hundredfold at a time.
 pub(super) fn newton_step(
-    pattern: &Pattern,
-    analysis: &crate::sparse::Analysis,
+    problem: &Problem,
+    (pattern, analysis): (&Pattern, &Analysis),
     model: &mut Model,
 ) -> Result<Vec<f64>, Error> {
     let mut shift = 1e-12;
     loop {
-        match analysis.factorise(&model.hessian) {
+        match analysis.factorise(&model.hessian, problem.pace.host) {
             Ok(factor) => {
                 let mut step: Vec<f64> = model.gradient.iter().map(|g| -g).collect();
                 factor.solve(&mut step, 1);
