@@ -1,6 +1,7 @@
 //! The command line.
 
-use crate::settings::{FeatureAngle, HandOff, Log, Said, Settings, SettingsError};
+use crate::settings::{FeatureAngle, HandOff, Inputs, Log, Said, Settings, SettingsError};
+use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -21,10 +22,14 @@ pub struct Cli {
 pub enum Verb {
     /// Process files, once
     Run(Run),
+    /// Process every file that is dropped into a folder, until told to stop
+    Watch(Watch),
     /// Re-prove certificates from the files on disk, trusting nothing else
     Check(Check),
     /// Tell what a surface is: topology, defects
     Info(Info),
+    /// Tell what a running daemon does: queue, stages and progress, done, refused
+    Status(Status),
 }
 
 /// `planish run`
@@ -33,6 +38,58 @@ pub struct Run {
     /// Files (.stl, .obj), or folders of them
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
+    /// Shared options
+    #[command(flatten)]
+    pub making: Making,
+    /// Shared options
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// `planish watch`
+#[derive(Debug, Args)]
+pub struct Watch {
+    /// Folder into which files (.stl, .obj) are dropped
+    #[arg(value_name = "INBOX")]
+    pub inbox: PathBuf,
+    /// Look at the inbox every second, instead of being told by the system: for network folders
+    #[arg(long)]
+    pub poll: bool,
+    /// Watch sub-folders, too: INBOX/sub/a.stl becomes OUT/sub/a.stl/
+    #[arg(long)]
+    pub recursive: bool,
+    /// When told to stop, finish what waits first
+    #[arg(long)]
+    pub drain: bool,
+    /// What becomes of an input once it is certified and all commands on it have succeeded: keep, move:DIR or delete
+    /// [default: keep]
+    #[arg(long, value_name = "keep|move:DIR|delete")]
+    pub inputs: Option<Inputs>,
+    /// Shared options
+    #[command(flatten)]
+    pub making: Making,
+    /// Shared options
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// `planish status`
+#[derive(Debug, Args)]
+pub struct Status {
+    /// The output folder of the daemon
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Shared options
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// Options of the verbs that make results.
+#[derive(Debug, Default, Args)]
+pub struct Making {
     /// Folder for the results: one folder per input, named like it
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -61,12 +118,16 @@ pub struct Run {
     /// Process inputs whose output is up to date, too
     #[arg(long)]
     pub force: bool,
+    /// Compute this much at once: inputs, or charts of one input [default: the number of processors]
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<usize>,
+    /// Memory for inputs on their way and factorisations, as 8GiB or 500M; what needs more alone is done alone [default:
+    /// half of the machine's]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<ByteSize>,
     /// Shared options
     #[command(flatten)]
     pub reading: Reading,
-    /// Shared options
-    #[command(flatten)]
-    pub common: Common,
 }
 
 /// `planish check`
@@ -129,30 +190,49 @@ impl Verb {
     /// [`SettingsError`]: wrong usage.
     pub fn settings(&self) -> Result<Settings, SettingsError> {
         let (common, mut said) = match self {
-            Self::Run(run) => {
-                let said = Said {
-                    out: run.out.clone(),
-                    order: run.order,
-                    weld: run.reading.weld,
-                    feature_angle: run.feature_angle,
-                    strict_disks: run.strict_disks.then_some(true),
-                    max_area_ratio: run.max_area_ratio,
-                    max_triangles: run.max_triangles,
-                    hand_off: run.hand_off,
-                    size: run.size,
-                    force: run.force.then_some(true),
-                    ..Said::default()
-                };
-                (&run.common, said)
-            }
+            Self::Run(run) => (&run.common, run.making.said()),
+            Self::Watch(watch) => (&watch.common, watch.said()),
             Self::Check(check) => (&check.common, Said::default()),
             Self::Info(info) => (&info.common, Said { weld: info.reading.weld, ..Said::default() }),
+            Self::Status(status) => (&status.common, Said { out: status.out.clone(), ..Said::default() }),
         };
         said.log = common.log;
         said.verbose = (common.verbose > 0).then_some(common.verbose);
         said.quiet = common.quiet.then_some(true);
         let file = common.config.as_deref().map(Said::from_file).transpose()?;
         said.or(file.unwrap_or_default()).check()
+    }
+}
+
+impl Watch {
+    fn said(&self) -> Said {
+        Said {
+            poll: self.poll.then_some(true),
+            recursive: self.recursive.then_some(true),
+            drain: self.drain.then_some(true),
+            inputs: self.inputs.clone(),
+            ..self.making.said()
+        }
+    }
+}
+
+impl Making {
+    fn said(&self) -> Said {
+        Said {
+            out: self.out.clone(),
+            order: self.order,
+            weld: self.reading.weld,
+            feature_angle: self.feature_angle,
+            strict_disks: self.strict_disks.then_some(true),
+            max_area_ratio: self.max_area_ratio,
+            max_triangles: self.max_triangles,
+            hand_off: self.hand_off,
+            size: self.size,
+            force: self.force.then_some(true),
+            jobs: self.jobs,
+            memory: self.memory,
+            ..Said::default()
+        }
     }
 }
 

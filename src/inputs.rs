@@ -43,7 +43,7 @@ pub fn collect(inputs: &[PathBuf]) -> Result<Vec<Job>, InputError> {
         if input.is_dir() {
             jobs.extend(folder(input)?);
         } else if input.file_name().is_some() {
-            jobs.push(Job::new(input.clone()));
+            jobs.push(Job::of_file(input.clone()));
         } else {
             return Err(InputError::NoName(input.clone()));
         }
@@ -97,7 +97,7 @@ fn folder(path: &Path) -> Result<Vec<Job>, InputError> {
         return Err(InputError::EmptyFolder(path.to_owned()));
     }
     files.sort();
-    Ok(files.into_iter().map(Job::new).collect())
+    Ok(files.into_iter().map(Job::of_file).collect())
 }
 
 #[cfg(test)]
@@ -111,7 +111,7 @@ mod tests {
             std::fs::write(folder.path().join(name), "x").expect("written");
         }
         let jobs = collect(&[folder.path().to_owned()]).expect("meshes");
-        let names: Vec<_> = jobs.iter().map(|j| j.name.to_string_lossy().into_owned()).collect();
+        let names: Vec<_> = jobs.iter().map(|j| j.name.display().to_string()).collect();
         assert_eq!(names, ["a.obj", "b.stl", "c.ply"]);
         let twice = [folder.path().to_owned(), folder.path().join("b.stl")];
         let jobs = collect(&twice).expect("meshes");

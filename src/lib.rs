@@ -1,17 +1,30 @@
 //! planish: certified one-to-one quadratic parametrizations of poor surface triangulations.
 //!
 //! This is the shell around the pure crate [`pipeline`], as a library so that tests reach it: the only code that
-//! touches disk, clock, threads and environment. The verbs are in [`verbs`]; an input travels as a [`job::Job`].
+//! touches disk, clock, threads and environment. The verbs are in [`verbs`]; an input travels as a [`job::Job`] through
+//! the [`stages`], which [`conveyor`] runs on threads.
 
+pub mod chain;
 pub mod cli;
+pub mod conveyor;
+pub mod daemon;
 pub mod formats;
 pub mod hand_off;
 pub mod hooks;
+pub mod inbox;
 pub mod inputs;
 pub mod job;
+pub mod ledger;
 pub mod logging;
+pub mod look;
 pub mod outcome;
+pub mod places;
 pub mod publish;
+pub mod put_away;
 pub mod report;
 pub mod settings;
+pub mod signals;
+pub mod stages;
+pub mod status;
 pub mod verbs;
+pub mod watch;

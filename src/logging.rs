@@ -4,9 +4,9 @@ use crate::settings::{Log, Settings};
 use std::io::IsTerminal;
 use tracing::level_filters::LevelFilter;
 
-/// Starts logging. A panic becomes a log message too: it is caught per job, and told there.
-pub fn start(settings: &Settings) {
-    let level = match (settings.quiet, settings.verbose) {
+/// Starts logging; a daemon informs without being asked. A panic becomes a log message too: it is caught per job, and told there.
+pub fn start(settings: &Settings, is_daemon: bool) {
+    let level = match (settings.quiet, settings.verbose.saturating_add(u8::from(is_daemon))) {
         (true, _) => LevelFilter::ERROR,
         // What is refused is told by the summary already.
         (false, 0) => LevelFilter::ERROR,

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let ended = cli.verb.settings().map_err(Into::into).and_then(|settings| {
-        logging::start(&settings);
+        logging::start(&settings, matches!(cli.verb, Verb::Watch(_)));
         dispatch(&cli.verb, &settings)
     });
     ended
@@ -23,7 +23,9 @@ fn main() -> ExitCode {
 fn dispatch(verb: &Verb, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     match verb {
         Verb::Run(run) => verbs::run::run(&run.inputs, settings),
+        Verb::Watch(watch) => verbs::watch::watch(&watch.inbox, settings),
         Verb::Check(check) => Ok(verbs::check::check(&check.results, settings.quiet)),
         Verb::Info(info) => verbs::info::info(&info.inputs, info.json, settings),
+        Verb::Status(status) => verbs::status::status(status.json, settings),
     }
 }

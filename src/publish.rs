@@ -2,15 +2,16 @@
 //!
 //! The files of an input are written to a staging folder (`OUT/.planish/...`), brought to disk, and renamed into
 //! place in one step; an older result stays until then. Each process has a staging folder of its own, held by a
-//! lock; folders whose process is gone are cleared at the next start.
+//! lock; folders whose process is gone are cleared at the next start. What is published is the ledger of what was done:
+//! see [`crate::ledger`].
 
-use std::ffi::OsStr;
+use parking_lot::Mutex;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// The hidden folder for what is not complete yet.
-const STAGING: &str = ".planish";
+pub const STAGING: &str = ".planish";
 
 /// The file whose lock tells that a staging folder is in use.
 const LOCK: &str = "lock";
@@ -23,6 +24,8 @@ const GATE: &str = "opening";
 pub struct Publisher {
     out: PathBuf,
     staging: tempfile::TempDir,
+    /// Whether results may still be put in place; held while one is.
+    open: Mutex<bool>,
     _lock: File,
 }
 
@@ -45,6 +48,9 @@ pub enum PublishError {
         "{0} is there already and is no result of planish: it was left alone; move it away or use another output folder"
     )]
     Foreign(PathBuf),
+    /// A folder on the way is itself a result.
+    #[error("{0} is the result of an input: another result cannot lie in it; rename the folder in the inbox")]
+    Nested(PathBuf),
 }
 
 /// Attaches the path to an I/O error.
@@ -68,34 +74,82 @@ impl Publisher {
         let own = tempfile::Builder::new().prefix("run-").tempdir_in(&staging).map_err(at(&staging))?;
         let path = own.path().join(LOCK);
         let lock = File::create(&path).and_then(|f| f.lock().map(|()| f)).map_err(at(&path))?;
-        Ok(Self { out: out.to_owned(), staging: own, _lock: lock })
+        Ok(Self { out: out.to_owned(), staging: own, open: Mutex::new(true), _lock: lock })
     }
 
     /// Where the result of the input with this name is published.
-    pub fn target(&self, name: &OsStr) -> PathBuf {
+    pub fn target(&self, name: &Path) -> PathBuf {
         self.out.join(name)
     }
 
-    /// Publishes `files` as the result of the input `name`, all at once.
+    /// A folder for files on their way into a result. It goes when the process ends.
+    pub fn staging(&self) -> &Path {
+        self.staging.path()
+    }
+
+    /// Publishes `files` as the result of the input `name`, all at once, if it is still `wanted` when they are ready to
+    /// be put in place. Whether they were.
     ///
     /// # Errors
     /// [`PublishError`]; then an older result is untouched.
-    pub fn publish(&self, name: &OsStr, files: &[(String, Vec<u8>)]) -> Result<(), PublishError> {
+    pub fn publish(
+        &self,
+        name: &Path,
+        files: &[(String, Vec<u8>)],
+        wanted: impl Fn() -> bool,
+    ) -> Result<bool, PublishError> {
         let target = self.target(name);
-        if !may_be_replaced(&target) {
+        if !is_plain(name) || !may_be_replaced(&target) {
             return Err(PublishError::Foreign(target));
         }
-        let parent = tempfile::tempdir_in(self.staging.path()).map_err(at(self.staging.path()))?;
-        let fresh = parent.path().join(name);
+        let parent = tempfile::tempdir_in(self.staging()).map_err(at(self.staging()))?;
+        let fresh = parent.path().join(name.file_name().unwrap_or_default());
         fs::create_dir(&fresh).map_err(at(&fresh))?;
         for (file, bytes) in files {
             let path = fresh.join(file);
             write_synced(&path, bytes).map_err(at(&path))?;
         }
         sync_folder(&fresh).map_err(at(&fresh))?;
+        // One at a time, so that what is no longer wanted never takes the place of what came after it.
+        let open = self.open.lock();
+        if !*open || !wanted() {
+            return Ok(false);
+        }
+        let folder = self.folder_for(name)?;
         put_in_place(&fresh, &target, parent.path()).map_err(at(&target))?;
-        sync_folder(&self.out).map_err(at(&self.out))
+        sync_folder(&folder).map_err(at(&folder)).map(|()| true)
     }
+
+    /// Nothing is put in place any more, and the staging folder goes. Whoever still writes to it hears of an error.
+    pub fn close(&self) {
+        *self.open.lock() = false;
+        if let Err(error) = fs::remove_dir_all(self.staging()) {
+            tracing::debug!(%error, "the staging folder is left to the next start");
+        }
+    }
+
+    /// The folder in which the result `name` lies; made where it is missing.
+    fn folder_for(&self, name: &Path) -> Result<PathBuf, PublishError> {
+        let mut folder = self.out.clone();
+        for part in name.parent().into_iter().flat_map(Path::components) {
+            let above = folder.clone();
+            folder.push(part);
+            if folder.join(crate::report::FILE).exists() {
+                return Err(PublishError::Nested(folder));
+            }
+            match fs::create_dir(&folder) {
+                Ok(()) => sync_folder(&above).map_err(at(&above))?,
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(e) => return Err(at(&folder)(e)),
+            }
+        }
+        Ok(folder)
+    }
+}
+
+/// Whether a path leads down only.
+fn is_plain(name: &Path) -> bool {
+    name.components().all(|part| matches!(part, Component::Normal(_))) && name.file_name().is_some()
 }
 
 /// Whether nothing is there, or an older result (a folder with a report), or an empty folder.
@@ -178,11 +232,11 @@ mod tests {
     fn a_newer_result_takes_the_place_of_an_older_one_whole() {
         let out = tempfile::tempdir().expect("a folder");
         let publisher = Publisher::open(out.path()).expect("opens");
-        let name = OsStr::new("part.stl");
+        let name = Path::new("part.stl");
         let mut old = files("old");
         old.push(("only-old.txt".to_owned(), vec![]));
-        publisher.publish(name, &old).expect("published");
-        publisher.publish(name, &files("new")).expect("published");
+        publisher.publish(name, &old, || true).expect("published");
+        publisher.publish(name, &files("new"), || true).expect("published");
         let target = publisher.target(name);
         assert_eq!(fs::read_to_string(target.join("b.txt")).expect("there"), "new");
         assert!(!target.join("only-old.txt").exists());
@@ -197,10 +251,10 @@ mod tests {
     fn a_failed_publication_leaves_the_older_result() {
         let out = tempfile::tempdir().expect("a folder");
         let publisher = Publisher::open(out.path()).expect("opens");
-        let name = OsStr::new("part.stl");
-        publisher.publish(name, &files("old")).expect("published");
+        let name = Path::new("part.stl");
+        publisher.publish(name, &files("old"), || true).expect("published");
         let broken = vec![("b.txt".to_owned(), vec![]), ("no/such/folder.txt".to_owned(), vec![])];
-        assert!(publisher.publish(name, &broken).is_err());
+        assert!(publisher.publish(name, &broken, || true).is_err());
         assert_eq!(fs::read_to_string(publisher.target(name).join("b.txt")).expect("there"), "old");
     }
 
@@ -224,7 +278,7 @@ mod tests {
         let write = || {
             let publisher = Publisher::open(out.path()).expect("opens");
             for _ in 0..20 {
-                publisher.publish(OsStr::new("part.stl"), &files("new")).expect("published");
+                publisher.publish(Path::new("part.stl"), &files("new"), || true).expect("published");
             }
         };
         std::thread::scope(|s| (0..4).for_each(|_| drop(s.spawn(write))));
@@ -238,14 +292,37 @@ mod tests {
         fs::write(out.path().join("part.stl"), "an input").expect("written");
         fs::create_dir(out.path().join("folder.stl")).expect("made");
         fs::write(out.path().join("folder.stl/precious.txt"), "work").expect("written");
-        for name in ["part.stl", "folder.stl", "", STAGING] {
-            let refused = publisher.publish(OsStr::new(name), &files("new"));
+        for name in ["part.stl", "folder.stl", "", STAGING, "../part.stl", "/part.stl", "a/../b.stl"] {
+            let refused = publisher.publish(Path::new(name), &files("new"), || true);
             assert!(matches!(refused, Err(PublishError::Foreign(_))), "{name}: {refused:?}");
         }
         assert_eq!(fs::read_to_string(out.path().join("part.stl")).expect("there"), "an input");
         assert!(out.path().join("folder.stl/precious.txt").exists());
         fs::create_dir(out.path().join("empty.stl")).expect("made");
-        assert!(publisher.publish(OsStr::new("empty.stl"), &files("new")).is_ok());
+        assert!(publisher.publish(Path::new("empty.stl"), &files("new"), || true).is_ok());
+    }
+
+    #[test]
+    fn results_of_sub_folders_lie_in_sub_folders_but_not_in_results() {
+        let out = tempfile::tempdir().expect("a folder");
+        let publisher = Publisher::open(out.path()).expect("opens");
+        assert!(publisher.publish(Path::new("a/b/part.stl"), &files("new"), || true).expect("published"));
+        assert!(out.path().join("a/b/part.stl/b.txt").exists());
+        let nested = publisher.publish(Path::new("a/b/part.stl/c.stl"), &files("new"), || true);
+        assert!(matches!(nested, Err(PublishError::Nested(_))), "{nested:?}");
+    }
+
+    #[test]
+    fn what_is_not_wanted_any_more_is_not_put_in_place() {
+        let out = tempfile::tempdir().expect("a folder");
+        let publisher = Publisher::open(out.path()).expect("opens");
+        let name = Path::new("part.stl");
+        assert!(!publisher.publish(name, &files("new"), || false).expect("no error"));
+        assert_eq!(fs::read_dir(publisher.staging()).expect("there").count(), 1, "the lock only");
+        publisher.close();
+        assert!(publisher.publish(name, &files("new"), || true).is_err(), "there is no place for it any more");
+        assert!(!publisher.target(name).exists());
+        assert!(!publisher.staging().exists());
     }
 
     #[test]
@@ -258,7 +335,7 @@ mod tests {
         assert!(!abandoned.exists());
         let second = Publisher::open(out.path()).expect("opens beside the first");
         assert!(first.staging.path().exists());
-        second.publish(OsStr::new("b.stl"), &files("b")).expect("published");
-        first.publish(OsStr::new("a.stl"), &files("a")).expect("published");
+        second.publish(Path::new("b.stl"), &files("b"), || true).expect("published");
+        first.publish(Path::new("a.stl"), &files("a"), || true).expect("published");
     }
 }

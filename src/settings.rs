@@ -1,6 +1,7 @@
 //! Settings: what the user may say, typed and checked in one place.
 
 use crate::hooks::{Hook, HookRefused};
+use bytesize::ByteSize;
 use pipeline::Order;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -62,6 +63,40 @@ impl std::str::FromStr for FeatureAngle {
     }
 }
 
+/// What becomes of inputs of `planish watch` that are certified, and on which all commands succeeded.
+#[derive(Clone, Debug, PartialEq, Eq, Default, Deserialize)]
+#[serde(try_from = "String")]
+pub enum Inputs {
+    /// They stay.
+    #[default]
+    Keep,
+    /// They are moved to this folder.
+    Move(PathBuf),
+    /// They are deleted.
+    Delete,
+}
+
+impl std::str::FromStr for Inputs {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.strip_prefix("move:")) {
+            ("keep", _) => Ok(Self::Keep),
+            ("delete", _) => Ok(Self::Delete),
+            (_, Some(folder)) if !folder.is_empty() => Ok(Self::Move(folder.into())),
+            _ => Err(format!("{text} is none of keep, move:DIR and delete")),
+        }
+    }
+}
+
+impl TryFrom<String> for Inputs {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
 /// A command that runs after an input is certified: a table `[[on_certified]]` of planish.toml (see docs/hooks.md).
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -107,6 +142,18 @@ pub struct Said {
     pub size: Option<f64>,
     /// Process inputs whose output is up to date, too.
     pub force: Option<bool>,
+    /// How much is computed at once.
+    pub jobs: Option<usize>,
+    /// Memory for inputs on their way and factorisations.
+    pub memory: Option<ByteSize>,
+    /// Look at the inbox regularly instead of being told by the system.
+    pub poll: Option<bool>,
+    /// Sub-folders of the inbox, too.
+    pub recursive: Option<bool>,
+    /// When told to stop, finish what waits first.
+    pub drain: Option<bool>,
+    /// What becomes of certified inputs.
+    pub inputs: Option<Inputs>,
     /// Form of log messages.
     pub log: Option<Log>,
     /// How much more to log: 1 informs, 2 explains, 3 traces.
@@ -140,6 +187,18 @@ pub struct Settings {
     pub size: Option<f64>,
     /// Process inputs whose output is up to date, too.
     pub force: bool,
+    /// How much is computed at once.
+    pub jobs: usize,
+    /// Memory for inputs on their way and factorisations, in bytes.
+    pub memory: u64,
+    /// Look at the inbox regularly instead of being told by the system.
+    pub poll: bool,
+    /// Sub-folders of the inbox, too.
+    pub recursive: bool,
+    /// When told to stop, finish what waits first.
+    pub drain: bool,
+    /// What becomes of certified inputs.
+    pub inputs: Inputs,
     /// Form of log messages.
     pub log: Log,
     /// 0 warns, 1 informs, 2 explains, 3 traces.
@@ -183,6 +242,12 @@ pub enum SettingsError {
     /// The edge length is none.
     #[error("size is {0}; it must be a positive number: the edge length in the unit of the input")]
     Size(f64),
+    /// Nothing could be computed, or too much.
+    #[error("jobs is {0}; it must lie between 1 and {MOST_JOBS}")]
+    Jobs(usize),
+    /// Too little to do anything.
+    #[error("memory is {0}; it must be at least {LEAST_MEMORY}")]
+    Memory(ByteSize),
     /// A command cannot run.
     #[error("[[on_certified]], table {table}: {error}")]
     OnCertified {
@@ -209,6 +274,27 @@ pub enum SettingsError {
     },
 }
 
+/// More computations at once than this are a slip of the finger.
+const MOST_JOBS: usize = 1024;
+
+/// Less memory than this is a slip of the finger.
+const LEAST_MEMORY: ByteSize = ByteSize::mib(16);
+
+/// The processors that this process may use.
+fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get).min(MOST_JOBS)
+}
+
+/// Half of the memory of the machine, or of the control group (the container) in which this process runs; a little,
+/// where the system does not tell.
+fn half_of_the_memory() -> ByteSize {
+    let Ok(mut system) = sysinfo::System::new() else { return ByteSize::gib(1) };
+    system.refresh_memory();
+    let of_group = system.cgroup_limits().map(|limits| limits.total_memory).filter(|total| *total > 0);
+    let total = of_group.map_or(system.total_memory(), |group| group.min(system.total_memory()));
+    ByteSize::b(total / 2).max(LEAST_MEMORY)
+}
+
 impl Said {
     /// Reads planish.toml.
     ///
@@ -233,6 +319,12 @@ impl Said {
             hand_off: self.hand_off.or(other.hand_off),
             size: self.size.or(other.size),
             force: self.force.or(other.force),
+            jobs: self.jobs.or(other.jobs),
+            memory: self.memory.or(other.memory),
+            poll: self.poll.or(other.poll),
+            recursive: self.recursive.or(other.recursive),
+            drain: self.drain.or(other.drain),
+            inputs: self.inputs.or(other.inputs),
             log: self.log.or(other.log),
             verbose: self.verbose.or(other.verbose),
             quiet: self.quiet.or(other.quiet),
@@ -272,6 +364,15 @@ impl Said {
         if let Some(size) = self.size.filter(|s| !s.is_normal() || *s < 0.0) {
             return Err(SettingsError::Size(size));
         }
+        let jobs = self.jobs.unwrap_or_else(processors);
+        if !(1..=MOST_JOBS).contains(&jobs) {
+            return Err(SettingsError::Jobs(jobs));
+        }
+        let memory = self.memory.unwrap_or_else(half_of_the_memory);
+        if memory < LEAST_MEMORY {
+            return Err(SettingsError::Memory(memory));
+        }
+        let memory = memory.as_u64();
         Ok(Settings {
             out: self.out,
             order,
@@ -283,6 +384,12 @@ impl Said {
             hand_off: self.hand_off.unwrap_or_default(),
             size: self.size,
             force: self.force.unwrap_or(false),
+            jobs,
+            memory,
+            poll: self.poll.unwrap_or(false),
+            recursive: self.recursive.unwrap_or(false),
+            drain: self.drain.unwrap_or(false),
+            inputs: self.inputs.unwrap_or_default(),
             log: self.log.unwrap_or_default(),
             verbose: self.verbose.unwrap_or(0),
             quiet: self.quiet.unwrap_or(false),

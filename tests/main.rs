@@ -2,6 +2,7 @@
 
 mod check;
 mod corpus;
+mod daemon;
 mod every_mesh;
 mod fixtures;
 mod interop;

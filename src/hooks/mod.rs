@@ -13,9 +13,9 @@ mod account;
 mod process;
 mod template;
 
-use crate::job::read_file;
 use crate::report;
 use crate::settings::OnCertified;
+use crate::stages::read_file;
 pub use account::{Account, Outcome, Ran, SCHEMA};
 use process::{Limits, Trouble};
 use std::fs::{self, File};
@@ -159,13 +159,16 @@ fn at(path: &Path) -> impl FnOnce(io::Error) -> HookError {
     move |error| HookError::Io { path, error }
 }
 
+/// What became of the commands of a result, if that is told.
+pub fn account(target: &Target) -> Option<Account> {
+    serde_json::from_slice(&read_file(&target.folder.join(FILE)).ok()?).ok()
+}
+
 /// Whether `hooks` have not run for the report that is in the folder, or are configured otherwise since. A chain that
 /// failed is not due. Whoever asks knows that the result is certified.
 pub fn are_due(hooks: &[Hook], target: &Target) -> bool {
     let Some(report) = target.report().filter(|_| !hooks.is_empty()) else { return false };
-    let account = read_file(&target.folder.join(FILE)).ok();
-    let account: Option<Account> = account.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-    account.is_none_or(|a| !a.is_of(hooks, &report))
+    account(target).is_none_or(|a| !a.is_of(hooks, &report))
 }
 
 /// Runs `hooks` for a certified result and writes the account beside its report. `staging` is a folder on the same

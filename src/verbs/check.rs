@@ -8,10 +8,10 @@
 use super::{Exit, say, shown};
 use crate::formats::gmsh;
 use crate::formats::vtu::{self, Grid};
-use crate::job::{guard, read_file};
 use crate::outcome::{Reason, Status};
 use crate::report::{self, ChartReport, Report, certificate, chart_checksum};
 use crate::settings::HandOff;
+use crate::stages::{guard, read_file};
 use pipeline::certify::{self, PlanarMap, prove};
 use pipeline::grid::GridPoint;
 use std::path::{Path, PathBuf};

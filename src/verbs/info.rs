@@ -2,10 +2,11 @@
 
 use super::{Exit, say};
 use crate::inputs;
-use crate::job::{Job, guard, read_file, repaired};
+use crate::job::Job;
 use crate::outcome::Reason;
 use crate::report::{self, Counts, Repairs, Surface};
 use crate::settings::Settings;
+use crate::stages::{decode, guard, read_file, repaired};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -40,7 +41,7 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
 
 fn answer(job: &Job, settings: &Settings) -> Answer {
     let input = job.path.to_string_lossy().into_owned();
-    let found = guard(|| repaired(&job.read(&read_file(&job.path)?)?, settings));
+    let found = guard(|| repaired(&decode(&job.path, &read_file(&job.path)?)?, settings));
     match found {
         Ok(found) => Answer {
             surface: Some(report::surface(&found)),

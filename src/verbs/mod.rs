@@ -3,9 +3,14 @@
 pub mod check;
 pub mod info;
 pub mod run;
+pub mod status;
+pub mod watch;
 
 use std::io::Write;
 use std::path::Path;
+
+/// What is said where results have no place.
+const NO_OUT: &str = "no output folder: give --out DIR (or out = \"DIR\" in planish.toml)";
 
 /// Prints a line on standard output. That nobody reads it (a closed pipe, a full disk) is no reason to stop: the
 /// exit code and the files tell the result.

@@ -1,44 +1,83 @@
 //! `planish run`: process files, once.
 
 use super::{Exit, shown};
+use crate::conveyor::Conveyor;
 use crate::inputs;
-use crate::job::{Done, Job, Stage};
+use crate::job::{Done, End, Job};
 use crate::outcome::Status;
 use crate::publish::Publisher;
 use crate::report::Report;
 use crate::settings::Settings;
+use crate::signals;
+use crate::watch::Stop;
 use comfy_table::{CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::time::Duration;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// How long the jobs have to reach a safe point when the program is interrupted.
+const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Processes all inputs; prints a table of what became of them.
 ///
 /// # Errors
 /// What makes the call as a whole impossible: wrong usage.
 pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
-    let out = settings.out.as_deref().ok_or("no output folder: give --out DIR (or out = \"DIR\" in planish.toml)")?;
+    let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
     let jobs = inputs::collect(paths)?;
     inputs::refuse_same_names(&jobs)?;
     inputs::refuse_inside(&jobs, out)?;
-    let publisher = Publisher::open(out)?;
-    let progress = progress(jobs.len(), settings.quiet);
-    let mut rows = Vec::new();
-    for job in &jobs {
-        let tell = |stage: Stage| progress.set_message(format!("{}: {}", job.name.display(), stage.name()));
-        rows.push((job, job.run(settings, &publisher, &tell)));
-        progress.inc(1);
-    }
-    progress.finish_and_clear();
+    let publisher = Arc::new(Publisher::open(out)?);
+    let stop = signals::listen()?;
+    let conveyor = Conveyor::start(settings, publisher.clone())?;
+    let jobs: Vec<Arc<Job>> = jobs.into_iter().map(Arc::new).collect();
+    jobs.iter().for_each(|job| conveyor.submit(job.clone()));
+    conveyor.close();
+    let ends = follow(&jobs, &conveyor, &stop, settings.quiet);
+    publisher.close();
+    let rows: Vec<Row> = jobs.iter().map(AsRef::as_ref).zip(&ends).collect();
     if !settings.quiet {
         super::say(&table(&rows).to_string());
     }
-    for (job, result) in &rows {
-        tell_trouble(job, result);
+    rows.iter().for_each(|(job, end)| tell_trouble(job, end));
+    let is_good = |end: &End| matches!(end, End::Done(done) if done.report.status == Status::Certified);
+    Ok(if ends.iter().all(is_good) { Exit::Success } else { Exit::Refused })
+}
+
+/// Waits until all jobs have ended, and shows how far they are. When it is asked to stop, it cancels the others and
+/// waits for them a little.
+fn follow(jobs: &[Arc<Job>], conveyor: &Conveyor, stop: &Stop, quiet: bool) -> Vec<End> {
+    let bar = progress(jobs.len(), quiet);
+    let mut ends: Vec<Option<End>> = jobs.iter().map(|_| None).collect();
+    let (mut missing, mut latest) = (jobs.len(), None);
+    while missing > 0 && latest.is_none_or(|latest| Instant::now() < latest) {
+        if let Some(ended) = conveyor.next(Duration::from_millis(50)) {
+            if let Some(i) = jobs.iter().position(|job| Arc::ptr_eq(job, &ended.job)) {
+                ends[i] = Some(ended.end);
+            }
+            missing -= 1;
+            bar.inc(1);
+        } else if !bar.is_hidden() {
+            bar.set_message(message(conveyor));
+        }
+        if stop.is_asked() {
+            jobs.iter().for_each(|job| job.cancel());
+            latest = Some(Instant::now() + if latest.is_none() { PATIENCE } else { Duration::ZERO });
+        }
     }
-    let good = rows.iter().all(|(_, r)| r.as_ref().is_ok_and(|d| d.report.status == Status::Certified));
-    Ok(if good { Exit::Success } else { Exit::Refused })
+    bar.finish_and_clear();
+    ends.into_iter().map(|end| end.unwrap_or(End::Unwanted)).collect()
+}
+
+/// What is on its way.
+fn message(conveyor: &Conveyor) -> String {
+    let one = |job: crate::conveyor::board::Running| {
+        let charts = if job.charts > 1 { format!(" {}/{}", job.charts_done, job.charts) } else { String::new() };
+        format!("{}: {}{charts}", shown(&job.name), job.stage.name())
+    };
+    conveyor.running().into_iter().take(4).map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// A bar on the terminal; invisible where standard error is none.
@@ -52,10 +91,10 @@ fn progress(jobs: usize, quiet: bool) -> ProgressBar {
     bar
 }
 
-type Row<'a, E> = (&'a Job, Result<Done, E>);
+type Row<'a> = (&'a Job, &'a End);
 
 /// One line per input.
-fn table<E>(rows: &[Row<E>]) -> Table {
+fn table(rows: &[Row]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
     table.set_header(["input", "status", "triangles", "charts", "invalid", "untangled by", "area ratio", "cpu s"]);
@@ -64,12 +103,13 @@ fn table<E>(rows: &[Row<E>]) -> Table {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    for (job, result) in rows {
-        let name = shown(job.name.as_ref());
-        match result {
-            Ok(done) => table.add_row(cells(name, done)),
-            Err(_) => table.add_row(vec![name, "not written".to_owned()]),
-        };
+    for (job, end) in rows {
+        let name = shown(&job.name);
+        table.add_row(match end {
+            End::Done(done) | End::Unchained(done, _) => cells(name, done),
+            End::Unwanted => vec![name, "interrupted".to_owned()],
+            End::Changed | End::Unwritten(_) | End::Lost => vec![name, "not written".to_owned()],
+        });
     }
     table
 }
@@ -97,14 +137,17 @@ fn cells(name: String, done: &Done) -> Vec<String> {
 }
 
 /// Says on standard error what was wrong with an input.
-fn tell_trouble<E: std::fmt::Display>(job: &Job, result: &Result<Done, E>) {
+fn tell_trouble(job: &Job, end: &End) {
     let input = shown(&job.path);
-    match result {
-        Err(error) => eprintln!("planish: {input}: {error}"),
-        Ok(Done { report: Report { reason: Some(reason), status, .. }, .. }) => {
+    match end {
+        End::Unwritten(error) => eprintln!("planish: {input}: {error}"),
+        End::Unchained(_, error) => eprintln!("planish: {input}: certified, but {error}"),
+        End::Changed => eprintln!("planish: {input}: it changed while it was read; try again"),
+        End::Lost => eprintln!("planish: {input}: planish broke down; that is a fault of planish: please report it"),
+        End::Done(Done { report: Report { reason: Some(reason), status, .. }, .. }) => {
             let place = reason.place.as_ref().map_or(String::new(), |p| format!(" ({p})"));
             eprintln!("planish: {input}: {status}: {}{place} [{}]", reason.message, reason.code.name());
         }
-        Ok(_) => {}
+        End::Done(_) | End::Unwanted => {}
     }
 }

@@ -5,9 +5,9 @@ use crate::support::{Out, fixture, planish};
 use pipeline::decompose::assemble;
 use pipeline::mesh::TriangleSoup;
 use pipeline::{repair, shapes};
-use planish::job;
 use planish::report::{Input, Report};
 use planish::settings::{Said, Settings};
+use planish::stages;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +37,7 @@ fn write_labelled(
     let atlas = assemble(&found.mesh, &labels).expect("legal");
     let input = Input { name: "labelled".to_owned(), bytes: None, blake3: None };
     let mut report = Report::new(input, settings);
-    let files = job::finish(&found, atlas, settings, &mut report).expect("mapped");
+    let files = stages::finish(&found, atlas, settings, &mut report).expect("mapped");
     std::fs::create_dir_all(folder).expect("made");
     files.iter().for_each(|(name, content)| std::fs::write(folder.join(name), content).expect("written"));
     std::fs::write(folder.join("report.json"), report.to_json().expect("JSON")).expect("written");

@@ -1,0 +1,380 @@
+//! The stages, on threads of their own, and the bounded channels between them:
+//! **read -> decompose -> map -> untangle -> write**, and behind them the commands that run on certified results.
+//!
+//! What travels before mapping and after it is a chart, not a file: the charts of one large input keep all processors
+//! busy, and so do many small inputs. Rules that keep it moving:
+//!
+//! * There are three such belts, for small, middling and large inputs, so that no small input waits in a channel behind
+//!   the charts of a large one. Among themselves inputs wait in a fair order ([`queue`]).
+//! * No more computations run at once than `--jobs` says, over all belts ([`turnstile`]). Nobody waits for a channel,
+//!   memory or a disk while it holds a place; and channels lead forward only. So somebody always moves.
+//! * Inputs take memory before they are read, charts before they are factorised ([`budget`]).
+//! * A panic is caught where it happens and is a failure of its job. A job's end is told exactly once.
+//! * What comes out does not depend on any of this: charts are put together in their order.
+//!
+//! When no more inputs come, the stages end front to back, as each closes the channel to the next.
+
+pub mod board;
+pub mod budget;
+pub mod queue;
+mod surface;
+mod travel;
+pub mod turnstile;
+
+use crate::chain;
+use crate::job::{Done, End, Job, Stage, Stopped};
+use crate::ledger;
+use crate::outcome::{Code, Reason, Status};
+use crate::publish::{PublishError, Publisher};
+use crate::report::{self, Input, Report};
+use crate::settings::Settings;
+use crate::stages::{self, Files};
+use board::Running;
+use budget::Budget;
+use crossbeam_channel::{Receiver, Sender, bounded};
+use pipeline::MappedChart;
+use pipeline::atlas::Chart;
+use pipeline::host::Host;
+use pipeline::mesh::TriangleSoup;
+use queue::Queue;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+use surface::{Place, Surface};
+pub use travel::Ended;
+use travel::{Shared, Travel};
+use turnstile::Turnstile;
+
+/// Ended jobs that nobody has asked for yet, at most.
+const ENDED: usize = 64;
+
+/// Results that wait for their commands, at most: they hold no memory to speak of.
+const CHAINED: usize = 1024;
+
+/// Results that are written at once, per belt: writing waits for the disk.
+const WRITERS: usize = 4;
+
+/// The running stages.
+pub struct Conveyor {
+    shared: Arc<Shared>,
+    ended: Receiver<Ended>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Conveyor {
+    /// Starts the stages.
+    ///
+    /// # Errors
+    /// Where the system has no more threads.
+    pub fn start(settings: &Settings, publisher: Arc<Publisher>) -> std::io::Result<Self> {
+        let (ended, to_tell) = bounded(ENDED);
+        let shared = Arc::new(Shared {
+            settings: settings.clone(),
+            publisher,
+            queue: Queue::default(),
+            turnstile: Turnstile::new(settings.jobs),
+            budget: Budget::new(settings.memory),
+            board: board::Board::default(),
+            ended,
+        });
+        let mut conveyor = Self { shared, ended: to_tell, threads: Vec::new() };
+        let (chain, chained) = bounded(CHAINED);
+        for belt in 0..queue::BELTS {
+            conveyor.belt(belt, &chain)?;
+        }
+        conveyor.stage("chain", settings.jobs, chained, follow_up)?;
+        Ok(conveyor)
+    }
+
+    /// Starts the stages of one belt.
+    fn belt(&mut self, belt: usize, chain: &Sender<Chained>) -> std::io::Result<()> {
+        let jobs = self.shared.settings.jobs;
+        let (soups, to_cut) = bounded(1);
+        let (charts, to_map) = bounded(jobs);
+        let (mapped, to_untangle) = bounded(jobs);
+        let (finished, to_write) = bounded(jobs);
+        let (shared, refused, checked) = (self.shared.clone(), finished.clone(), chain.clone());
+        self.thread("read", move || {
+            while let Some(waiting) = shared.queue.pop(belt) {
+                read(Travel::begin(&shared, waiting), &soups, &refused, &checked);
+            }
+        })?;
+        let refused = finished.clone();
+        self.stage("decompose", jobs, to_cut, move |soup| cut(soup, &charts, &refused))?;
+        let refused = finished.clone();
+        self.stage("map", jobs, to_map, move |chart| map(chart, &mapped, &refused))?;
+        self.stage("untangle", jobs, to_untangle, move |mapped| untangle(mapped, &finished))?;
+        let chain = chain.clone();
+        self.stage("write", jobs.max(WRITERS), to_write, move |finished| write(finished, &chain))
+    }
+
+    /// Starts `count` threads that do `work` on everything that comes, until no more can come.
+    fn stage<T: Send + 'static>(
+        &mut self,
+        name: &str,
+        count: usize,
+        input: Receiver<T>,
+        work: impl Fn(T) + Clone + Send + 'static,
+    ) -> std::io::Result<()> {
+        for _ in 0..count {
+            let (input, work) = (input.clone(), work.clone());
+            self.thread(name, move || input.iter().for_each(&work))?;
+        }
+        Ok(())
+    }
+
+    fn thread(&mut self, name: &str, body: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+        self.threads.push(std::thread::Builder::new().name(name.to_owned()).spawn(body)?);
+        Ok(())
+    }
+
+    /// Puts a job in the queue.
+    pub fn submit(&self, job: Arc<Job>) {
+        self.shared.queue.push(job);
+    }
+
+    /// No more jobs come: those that wait are still done, then the stages end.
+    pub fn close(&self) {
+        self.shared.queue.close();
+    }
+
+    /// Jobs as they end: each exactly once.
+    pub fn ended(&self) -> &Receiver<Ended> {
+        &self.ended
+    }
+
+    /// The next job that ends; none: none did within `patience`.
+    pub fn next(&self, patience: Duration) -> Option<Ended> {
+        self.ended.recv_timeout(patience).ok()
+    }
+
+    /// The jobs that wait, in their order.
+    pub fn waiting(&self) -> Vec<Arc<Job>> {
+        self.shared.queue.waiting()
+    }
+
+    /// The jobs on their way.
+    pub fn running(&self) -> Vec<Running> {
+        self.shared.board.running()
+    }
+
+    /// Waits until all stages have ended, after [`Self::close`]; what ends meanwhile is not told any more.
+    pub fn join(self) {
+        for thread in self.threads {
+            while !thread.is_finished() {
+                let _ = self.ended.recv_timeout(Duration::from_millis(5));
+            }
+            // A stage that broke down told so when it did.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What decomposition gets.
+struct Soup {
+    travel: Arc<Travel>,
+    report: Report,
+    soup: TriangleSoup,
+}
+
+/// What mapping gets.
+struct Cut {
+    surface: Arc<Surface>,
+    place: Place,
+    chart: Chart,
+}
+
+/// What untangling gets.
+struct Mapped {
+    surface: Arc<Surface>,
+    place: Place,
+    mapped: (Chart, MappedChart),
+}
+
+/// What writing gets.
+enum Finished {
+    /// All charts are in, or one stopped the job.
+    Surface(Arc<Surface>),
+    /// There are no charts.
+    Stopped(Arc<Travel>, Box<Report>, Stopped),
+}
+
+/// What the commands get: a certified result.
+struct Chained {
+    travel: Arc<Travel>,
+    done: Done,
+}
+
+/// Hands something on. That fails only where the next stage is gone, which then told so; the item is dropped, and with
+/// it its job ends as lost.
+fn hand_on<T>(to: &Sender<T>, item: T) {
+    let _ = to.send(item);
+}
+
+fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, chain: &Sender<Chained>) {
+    if !travel.job.is_wanted() {
+        return travel.end(End::Unwanted);
+    }
+    if !travel.job.is_unchanged() {
+        return travel.end(End::Changed);
+    }
+    let content = stages::read_file(&travel.job.path);
+    if !travel.job.is_unchanged() {
+        return travel.end(End::Changed);
+    }
+    let Shared { settings, publisher, .. } = &*travel.shared;
+    let mut report = Report::new(input(&travel.job, content.as_deref().ok()), settings);
+    let decoded = travel.compute(Stage::Read, |_| {
+        let bytes = content?;
+        report.input.blake3 = Some(blake3::hash(&bytes).to_hex().to_string());
+        let older =
+            if settings.force { None } else { ledger::up_to_date(&publisher.target(&travel.job.name), &report) };
+        Ok(match older {
+            Some(older) => Err(older),
+            None => Ok(stages::decode(&travel.job.path, &bytes)?),
+        })
+    });
+    match decoded {
+        Ok(Ok(soup)) => hand_on(soups, Soup { travel, report, soup }),
+        Ok(Err(older)) => {
+            let _in_stage = travel.in_stage(Stage::Read);
+            tracing::info!(status = %older.status, "is up to date");
+            published(travel.clone(), Done { report: older, up_to_date: true }, chain);
+        }
+        Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
+    }
+}
+
+fn input(job: &Job, content: Option<&[u8]>) -> Input {
+    Input { name: job.name.to_string_lossy().into_owned(), bytes: content.map(|c| c.len() as u64), blake3: None }
+}
+
+fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
+    let settings = &travel.shared.settings;
+    match travel.compute(Stage::Decompose, |host| stages::cut(&soup, settings, &mut report, host)) {
+        Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
+        Ok((mesh, parts)) => {
+            drop(soup);
+            let surface = Surface::new(travel, mesh, parts.len(), report);
+            for (i, chart) in parts.into_iter().enumerate() {
+                hand_on(charts, Cut { surface: surface.clone(), place: (i, 0), chart });
+            }
+        }
+    }
+}
+
+fn map(Cut { surface, place, chart }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
+    let travel = &surface.travel;
+    let work = |host: &dyn Host| stages::map(&surface.mesh, chart, &travel.shared.settings, host);
+    let parts = if surface.is_due(place) { travel.compute(Stage::Map, work) } else { Err(Stopped::Unwanted) };
+    match parts {
+        Err(why) => deposit(surface, place, Err(why), finished),
+        Ok(parts) => {
+            surface.expect(parts.len() - 1);
+            for (k, mapped) in parts.into_iter().enumerate() {
+                hand_on(untangle, Mapped { surface: surface.clone(), place: (place.0, k), mapped });
+            }
+        }
+    }
+}
+
+fn untangle(Mapped { surface, place, mapped }: Mapped, finished: &Sender<Finished>) {
+    let travel = &surface.travel;
+    let work = |host: &dyn Host| stages::untangle(&surface.mesh, mapped, &travel.shared.settings, host);
+    let part = if surface.is_due(place) { travel.compute(Stage::Untangle, work) } else { Err(Stopped::Unwanted) };
+    deposit(surface, place, part, finished);
+}
+
+fn deposit(
+    surface: Arc<Surface>,
+    place: Place,
+    part: Result<Vec<(Chart, pipeline::CertifiedChart)>, Stopped>,
+    finished: &Sender<Finished>,
+) {
+    if surface.deposit(place, part) {
+        hand_on(finished, Finished::Surface(surface));
+    }
+}
+
+fn write(finished: Finished, chain: &Sender<Chained>) {
+    let (travel, mut report, files) = match finished {
+        Finished::Stopped(travel, report, why) => (travel, *report, Err(why)),
+        Finished::Surface(surface) => {
+            let (mut report, done) = surface.collect();
+            let settings = &surface.travel.shared.settings;
+            let assembled = surface.travel.compute(Stage::Write, |_| {
+                Ok(stages::assemble(&surface.mesh, done?, surface.whole, settings, &mut report)?)
+            });
+            (surface.travel.clone(), report, assembled)
+        }
+    };
+    let _in_stage = travel.in_stage(Stage::Write);
+    let files = match files {
+        Ok(files) => files,
+        Err(Stopped::Unwanted) => return travel.end(End::Unwanted),
+        Err(Stopped::For(reason)) => {
+            refuse(&mut report, reason);
+            Files::new()
+        }
+    };
+    report.timing = travel.timing();
+    match publish(&travel, &report, files) {
+        Ok(true) => {
+            log(&report);
+            published(travel.clone(), Done { report, up_to_date: false }, chain);
+        }
+        Ok(false) => travel.end(End::Unwanted),
+        Err(error) => {
+            tracing::error!("the result is not written: {error}");
+            travel.end(End::Unwritten(error));
+        }
+    }
+}
+
+/// The report of an input that is refused, or failed.
+fn refuse(report: &mut Report, reason: Reason) {
+    report.status = reason.status();
+    if reason.code == Code::Internal {
+        // What a stage that broke down left in it is not to be trusted.
+        report.charts.clear();
+        report.outputs.clear();
+    }
+    report.reason = Some(reason);
+}
+
+fn publish(travel: &Travel, report: &Report, mut files: Files) -> Result<bool, PublishError> {
+    files.push((report::FILE.to_owned(), report.to_json().map_err(PublishError::Report)?));
+    travel.shared.publisher.publish(&travel.job.name, &files, || travel.job.is_wanted())
+}
+
+fn log(report: &Report) {
+    match &report.reason {
+        None => tracing::info!(status = %report.status, charts = report.charts.len(), "ends"),
+        Some(r) if report.status == Status::Refused => tracing::warn!(code = r.code.name(), "refused: {}", r.message),
+        Some(r) => tracing::error!(code = r.code.name(), "failed: {}", r.message),
+    }
+}
+
+/// A result stands: what is certified goes to the commands, where there are any.
+fn published(travel: Arc<Travel>, done: Done, chain: &Sender<Chained>) {
+    if done.report.status == Status::Certified && chain::is_asked_for(&travel.shared.settings) {
+        hand_on(chain, Chained { travel, done });
+    } else {
+        travel.end(End::Done(done));
+    }
+}
+
+/// Runs the commands on a certified result, and puts its input away.
+fn follow_up(Chained { travel, done }: Chained) {
+    travel.reached(Stage::Chain);
+    let _in_stage = travel.in_stage(Stage::Chain);
+    let Shared { settings, publisher, .. } = &*travel.shared;
+    travel.end(match chain::run(&travel.job, &done.report, settings, publisher) {
+        Ok(true) => End::Done(done),
+        Ok(false) => End::Unwanted,
+        Err(error) => {
+            tracing::error!("{error}");
+            End::Unchained(done, error.to_string())
+        }
+    });
+}

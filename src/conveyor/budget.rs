@@ -1,0 +1,118 @@
+//! The memory budget: what inputs on their way and factorisations may take together.
+//!
+//! Two accounts share one limit. An input takes the memory of its data before it is read and holds it until it has
+//! ended; a chart takes that of a factorisation before it begins. Neither waits for ever: where its own account is
+//! empty, a request is granted whatever its size, so that an input larger than the budget is done too, alone; and who
+//! holds a factorisation waits for nothing but its turn to compute. Requests of one account are granted in the order of
+//! their turns.
+
+use super::queue::Turn;
+use parking_lot::{Condvar, Mutex};
+use std::collections::BTreeSet;
+
+/// Who asks for memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Account {
+    /// The data of an input.
+    Input,
+    /// A factorisation.
+    Factor,
+}
+
+/// Memory that may be taken.
+#[derive(Debug)]
+pub struct Budget {
+    limit: u64,
+    state: Mutex<State>,
+    given_back: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    taken: [u64; 2],
+    tickets: u64,
+    waiting: [BTreeSet<(Turn, u64)>; 2],
+}
+
+impl Budget {
+    /// A budget of `limit` bytes.
+    pub fn new(limit: u64) -> Self {
+        Self { limit, state: Mutex::default(), given_back: Condvar::new() }
+    }
+
+    /// Takes `bytes` if they are there and nobody waits for them.
+    pub fn try_take(&self, account: Account, bytes: u64) -> bool {
+        let mut state = self.state.lock();
+        let granted = state.waiting[account as usize].is_empty() && self.fits(&state, account, bytes);
+        if granted {
+            state.taken[account as usize] += bytes;
+        }
+        granted
+    }
+
+    /// Takes `bytes` whether they are there or not: for what is cancelled, and will give them back at once.
+    pub fn overdraw(&self, account: Account, bytes: u64) {
+        self.state.lock().taken[account as usize] += bytes;
+    }
+
+    /// Waits until `bytes` are there, and takes them.
+    pub fn take(&self, account: Account, bytes: u64, turn: Turn) {
+        let mut state = self.state.lock();
+        state.tickets += 1;
+        let me = (turn, state.tickets);
+        state.waiting[account as usize].insert(me);
+        while state.waiting[account as usize].first() != Some(&me) || !self.fits(&state, account, bytes) {
+            self.given_back.wait(&mut state);
+        }
+        state.waiting[account as usize].remove(&me);
+        state.taken[account as usize] += bytes;
+        self.given_back.notify_all();
+    }
+
+    /// Gives `bytes` back.
+    pub fn give_back(&self, account: Account, bytes: u64) {
+        self.state.lock().taken[account as usize] -= bytes;
+        self.given_back.notify_all();
+    }
+
+    fn fits(&self, state: &State, account: Account, bytes: u64) -> bool {
+        let taken = state.taken.iter().sum::<u64>();
+        state.taken[account as usize] == 0 || taken.saturating_add(bytes) <= self.limit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    #[test]
+    fn no_more_is_taken_than_the_limit_unless_alone() {
+        let (budget, taken) = (Budget::new(100), AtomicU64::new(0));
+        std::thread::scope(|s| {
+            for (turn, bytes) in [30, 60, 20, 90, 40, 10, 500].into_iter().enumerate() {
+                let (budget, taken) = (&budget, &taken);
+                s.spawn(move || {
+                    for _ in 0..100 {
+                        budget.take(Account::Factor, bytes, turn as u64);
+                        let together = taken.fetch_add(bytes, Ordering::SeqCst) + bytes;
+                        assert!(together <= 100 || together == bytes, "{together}");
+                        taken.fetch_sub(bytes, Ordering::SeqCst);
+                        budget.give_back(Account::Factor, bytes);
+                    }
+                });
+            }
+        });
+        assert_eq!(budget.state.lock().taken, [0, 0]);
+    }
+
+    #[test]
+    fn a_factorisation_is_granted_beside_inputs_that_hold_all() {
+        let budget = Budget::new(100);
+        budget.take(Account::Input, 400, 0);
+        assert!(!budget.try_take(Account::Input, 1));
+        assert!(budget.try_take(Account::Factor, 50) && !budget.try_take(Account::Factor, 50));
+        budget.give_back(Account::Input, 400);
+        assert!(budget.try_take(Account::Factor, 50));
+    }
+}

@@ -1,0 +1,144 @@
+//! The jobs that wait, in a fair order.
+//!
+//! A job is served by its place in *virtual time*: the bytes of all jobs that had ended when it came, plus its own
+//! (self-clocked fair queueing; Golestani 1994, doi 10.1109/INFCOM.1994.337677). So small files pass a large one that
+//! came before them, but only until as many bytes as it has were done: nobody waits for ever.
+
+use crate::job::Job;
+use parking_lot::{Condvar, Mutex};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A place in virtual time: who comes first has the smaller one.
+pub type Turn = u64;
+
+/// What every job costs beside its bytes, in bytes.
+const OVERHEAD: u64 = 16 << 10;
+
+/// Jobs below these sizes (bytes) travel apart from larger ones, so that a stage never waits for a job that is
+/// thousands of times as large.
+const CLASSES: [u64; BELTS - 1] = [1 << 20, 16 << 20];
+
+/// How many classes of size there are, and thus belts.
+pub const BELTS: usize = 3;
+
+/// A job with its place in the order.
+#[derive(Clone, Debug)]
+pub struct Waiting {
+    /// The job.
+    pub job: Arc<Job>,
+    /// Its place in virtual time.
+    pub turn: Turn,
+}
+
+/// The jobs that wait.
+#[derive(Debug, Default)]
+pub struct Queue {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    belts: [BTreeMap<(Turn, u64), Waiting>; BELTS],
+    arrivals: u64,
+    ended: u64,
+    closed: bool,
+}
+
+/// The belt for an input of `bytes`.
+fn belt(bytes: u64) -> usize {
+    CLASSES.iter().take_while(|limit| bytes >= **limit).count()
+}
+
+impl Queue {
+    /// Puts a job in its place.
+    pub fn push(&self, job: Arc<Job>) {
+        let mut state = self.state.lock();
+        let turn = state.ended + job.bytes + OVERHEAD;
+        state.arrivals += 1;
+        let arrival = state.arrivals;
+        state.belts[belt(job.bytes)].insert((turn, arrival), Waiting { job, turn });
+        self.changed.notify_all();
+    }
+
+    /// The next job for `belt`; waits for one. None: there will be no more.
+    pub fn pop(&self, belt: usize) -> Option<Waiting> {
+        let mut state = self.state.lock();
+        loop {
+            if let Some((_, waiting)) = state.belts[belt].pop_first() {
+                return Some(waiting);
+            }
+            if state.closed {
+                return None;
+            }
+            self.changed.wait(&mut state);
+        }
+    }
+
+    /// A job ended: virtual time goes on.
+    pub fn ended(&self, job: &Job) {
+        self.state.lock().ended += job.bytes + OVERHEAD;
+    }
+
+    /// No more jobs will come: those that wait are still served.
+    pub fn close(&self) {
+        self.state.lock().closed = true;
+        self.changed.notify_all();
+    }
+
+    /// The jobs that wait, in the order in which they will be served as far as that is known.
+    pub fn waiting(&self) -> Vec<Arc<Job>> {
+        let state = self.state.lock();
+        let mut all: Vec<_> = state.belts.iter().flatten().collect();
+        all.sort_by_key(|(place, _)| **place);
+        all.into_iter().filter(|(_, w)| w.job.is_wanted()).map(|(_, w)| w.job.clone()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn job(name: &str, bytes: u64) -> Arc<Job> {
+        Arc::new(Job::new(name.into(), name.into(), bytes))
+    }
+
+    fn names(queue: &Queue) -> Vec<String> {
+        queue.waiting().iter().map(|j| j.name.display().to_string()).collect()
+    }
+
+    #[test]
+    fn small_jobs_pass_a_large_one_but_not_for_ever() {
+        let queue = Queue::default();
+        queue.push(job("large", 900_000));
+        queue.push(job("small", 1000));
+        assert_eq!(names(&queue), ["small", "large"]);
+        let served = |queue: &Queue| queue.pop(0).expect("one waits").job;
+        queue.ended(&served(&queue));
+        let mut passed = 0;
+        loop {
+            queue.push(job("late", 1000));
+            let next = served(&queue);
+            queue.ended(&next);
+            if next.name.display().to_string() == "large" {
+                break;
+            }
+            passed += 1;
+            assert!(passed < 100, "the large one starves");
+        }
+        assert!(passed > 40, "only {passed} passed");
+    }
+
+    #[test]
+    fn jobs_of_equal_size_keep_their_order_and_sizes_travel_apart() {
+        let queue = Queue::default();
+        ["a", "b", "c"].iter().for_each(|n| queue.push(job(n, 10)));
+        queue.push(job("huge", 1 << 30));
+        queue.close();
+        let queue = &queue;
+        let rest = |belt| std::iter::from_fn(move || queue.pop(belt)).map(|w| w.job.name.display().to_string());
+        assert_eq!(rest(0).collect::<Vec<_>>(), ["a", "b", "c"]);
+        assert_eq!((rest(1).count(), rest(2).collect::<Vec<_>>()), (0, vec!["huge".to_owned()]));
+    }
+}

@@ -1,0 +1,73 @@
+//! A surface whose charts are on their way: they are put together when the last one is in.
+
+use super::travel::Travel;
+use crate::job::Stopped;
+use crate::report::Report;
+use parking_lot::Mutex;
+use pipeline::CertifiedChart;
+use pipeline::atlas::Chart;
+use pipeline::mesh::SurfaceMesh;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The place of a part among the others: that of its chart, and which part of it.
+pub(super) type Place = (usize, usize);
+
+/// A surface that was cut into charts.
+pub(super) struct Surface {
+    pub travel: Arc<Travel>,
+    pub mesh: SurfaceMesh,
+    /// How many charts decomposition made.
+    pub whole: usize,
+    parts: Mutex<Parts>,
+}
+
+struct Parts {
+    report: Report,
+    missing: usize,
+    done: BTreeMap<Place, Vec<(Chart, CertifiedChart)>>,
+    stopped: Option<(Place, Stopped)>,
+}
+
+impl Surface {
+    /// A surface of which no chart is mapped yet.
+    pub fn new(travel: Arc<Travel>, mesh: SurfaceMesh, whole: usize, report: Report) -> Arc<Self> {
+        travel.shared.board.update(travel.number, |job| job.charts = whole);
+        let parts = Parts { report, missing: whole, done: BTreeMap::new(), stopped: None };
+        Arc::new(Self { travel, mesh, whole, parts: Mutex::new(parts) })
+    }
+
+    /// Whether the part at `place` is still to be done. Where one of several parts stops the job, it is always the first
+    /// of those that would: so parts before it are done, and parts behind it are not.
+    pub fn is_due(&self, place: Place) -> bool {
+        self.parts.lock().stopped.as_ref().is_none_or(|(stopped, _)| place < *stopped)
+    }
+
+    /// A chart came as several parts instead of one.
+    pub fn expect(&self, more: usize) {
+        self.parts.lock().missing += more;
+        self.travel.shared.board.update(self.travel.number, |job| job.charts += more);
+    }
+
+    /// A part is done, or stopped. Whether it was the last one.
+    pub fn deposit(&self, place: Place, part: Result<Vec<(Chart, CertifiedChart)>, Stopped>) -> bool {
+        self.travel.shared.board.update(self.travel.number, |job| job.charts_done += 1);
+        let mut parts = self.parts.lock();
+        match part {
+            Ok(charts) => drop(parts.done.insert(place, charts)),
+            Err(why) if parts.stopped.as_ref().is_none_or(|(stopped, _)| place < *stopped) => {
+                parts.stopped = Some((place, why));
+            }
+            Err(_) => {}
+        }
+        parts.missing -= 1;
+        parts.missing == 0
+    }
+
+    /// The report so far and all charts in order, or why there are not all.
+    pub fn collect(&self) -> (Report, Result<Vec<(Chart, CertifiedChart)>, Stopped>) {
+        let mut parts = self.parts.lock();
+        let done = std::mem::take(&mut parts.done).into_values().flatten().collect();
+        (parts.report.clone(), parts.stopped.take().map_or(Ok(done), |(_, why)| Err(why)))
+    }
+}

@@ -1,0 +1,158 @@
+//! A job between the stages: what it has taken and must give back, whatever becomes of it.
+
+use super::board::Board;
+use super::budget::{Account, Budget};
+use super::queue::{Queue, Turn, Waiting};
+use super::turnstile::Turnstile;
+use crate::job::{End, Job, Stage, Stopped};
+use crate::publish::Publisher;
+use crate::settings::Settings;
+use crate::stages::guard;
+use crossbeam_channel::Sender;
+use parking_lot::Mutex;
+use pipeline::host::Host;
+use rustix::time::{ClockId, clock_gettime};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tracing::Span;
+
+/// What all threads share.
+pub(super) struct Shared {
+    pub settings: Settings,
+    pub publisher: Arc<Publisher>,
+    pub queue: Queue,
+    pub turnstile: Turnstile,
+    pub budget: Budget,
+    pub board: Board,
+    pub ended: Sender<Ended>,
+}
+
+/// A job that has ended.
+#[derive(Debug)]
+pub struct Ended {
+    /// The job.
+    pub job: Arc<Job>,
+    /// How it ended.
+    pub end: End,
+}
+
+/// A job on its way. When the last stage lets go of it, its memory is given back and its end is told: exactly once,
+/// even where a stage breaks down.
+pub(super) struct Travel {
+    pub shared: Arc<Shared>,
+    pub job: Arc<Job>,
+    pub number: u64,
+    turn: Turn,
+    memory: u64,
+    span: Span,
+    seconds: Mutex<BTreeMap<&'static str, f64>>,
+    end: Mutex<Option<End>>,
+}
+
+/// What an input takes per byte of its file from reading to writing: measured, see docs/memory in the tests.
+const MEMORY_PER_BYTE: u64 = 40;
+
+impl Travel {
+    /// Takes a job up, once there is memory for its data.
+    pub fn begin(shared: &Arc<Shared>, Waiting { job, turn }: Waiting) -> Arc<Self> {
+        let number = shared.board.add(&job);
+        let memory = if job.is_wanted() { job.bytes.saturating_mul(MEMORY_PER_BYTE) } else { 0 };
+        shared.budget.take(Account::Input, memory, turn);
+        let span = tracing::info_span!("job", input = %job.name.display());
+        span.in_scope(|| tracing::info!("begins"));
+        let (seconds, end) = (Mutex::default(), Mutex::new(None));
+        Arc::new(Self { shared: shared.clone(), job, number, turn, memory, span, seconds, end })
+    }
+
+    /// Does the work of a stage: in its turn, its processor time booked. A panic is a failure of the job; what comes
+    /// out for a job that nobody wants any more is dropped.
+    pub fn compute<T>(&self, stage: Stage, work: impl FnOnce(&dyn Host) -> Result<T, Stopped>) -> Result<T, Stopped> {
+        self.reached(stage);
+        let seat = Seat::take(self);
+        let _in_stage = self.in_stage(stage);
+        let started = cpu_seconds();
+        let result = if self.job.is_wanted() { guard(|| work(&seat)) } else { Err(Stopped::Unwanted) };
+        *self.seconds.lock().entry(stage.name()).or_insert(0.0) += cpu_seconds() - started;
+        if self.job.is_wanted() { result } else { Err(Stopped::Unwanted) }
+    }
+
+    /// Log messages until the end of what is returned are those of this job and stage.
+    pub fn in_stage(&self, stage: Stage) -> impl Drop {
+        self.span.in_scope(|| tracing::info_span!("stage", name = stage.name())).entered()
+    }
+
+    /// Tells that the job has come so far.
+    pub fn reached(&self, stage: Stage) {
+        self.shared.board.update(self.number, |job| job.stage = job.stage.max(stage));
+    }
+
+    /// The processor time of all stages so far. Milliseconds are enough, and read well.
+    pub fn timing(&self) -> BTreeMap<String, f64> {
+        let seconds = self.seconds.lock();
+        seconds.iter().map(|(stage, s)| ((*stage).to_owned(), (s * 1e3).round() / 1e3)).collect()
+    }
+
+    /// How the job ended.
+    pub fn end(&self, end: End) {
+        *self.end.lock() = Some(end);
+    }
+}
+
+impl Drop for Travel {
+    fn drop(&mut self) {
+        self.shared.budget.give_back(Account::Input, self.memory);
+        self.shared.board.remove(self.number);
+        self.shared.queue.ended(&self.job);
+        let end = self.end.get_mut().take().unwrap_or(End::Lost);
+        // Fails only where nobody asks any more.
+        let _ = self.shared.ended.send(Ended { job: self.job.clone(), end });
+    }
+}
+
+/// A place inside the turnstile.
+struct Seat<'a>(&'a Travel);
+
+impl<'a> Seat<'a> {
+    fn take(travel: &'a Travel) -> Self {
+        travel.shared.turnstile.enter(travel.turn);
+        Self(travel)
+    }
+}
+
+impl Drop for Seat<'_> {
+    fn drop(&mut self) {
+        self.0.shared.turnstile.leave();
+    }
+}
+
+impl Host for Seat<'_> {
+    fn go_on(&self) -> bool {
+        let Travel { shared, turn, job, .. } = self.0;
+        if job.is_wanted() {
+            shared.turnstile.let_pass(*turn);
+        }
+        job.is_wanted()
+    }
+
+    fn reserve(&self, bytes: u64) {
+        let Travel { shared, turn, job, .. } = self.0;
+        if !job.is_wanted() {
+            shared.budget.overdraw(Account::Factor, bytes);
+        } else if !shared.budget.try_take(Account::Factor, bytes) {
+            tracing::debug!(bytes, "waits for memory");
+            shared.turnstile.leave();
+            shared.budget.take(Account::Factor, bytes, *turn);
+            shared.turnstile.enter(*turn);
+        }
+    }
+
+    fn release(&self, bytes: u64) {
+        self.0.shared.budget.give_back(Account::Factor, bytes);
+    }
+}
+
+/// Processor seconds of this thread.
+fn cpu_seconds() -> f64 {
+    let t = clock_gettime(ClockId::ThreadCPUTime);
+    t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
+}

@@ -1,0 +1,122 @@
+//! The turnstile: no more computations at once than `--jobs` says.
+//!
+//! Whoever computes has gone through, and leaves before it waits for anything else: a full channel, memory, a disk. So
+//! those inside always move on, and nobody waits in a circle. Those who wait enter in the order of their turns; at its
+//! safe points a long computation lets those ahead of it pass.
+
+use super::queue::Turn;
+use parking_lot::{Condvar, Mutex};
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Lets a number of computations in.
+#[derive(Debug)]
+pub struct Turnstile {
+    state: Mutex<State>,
+    moved: Condvar,
+    /// The least turn that waits: a hint, read without the lock.
+    ahead: AtomicU64,
+}
+
+#[derive(Debug)]
+struct State {
+    free: usize,
+    tickets: u64,
+    waiting: BTreeSet<(Turn, u64)>,
+}
+
+impl Turnstile {
+    /// One that lets `places` computations in at once.
+    pub fn new(places: usize) -> Self {
+        let state = State { free: places, tickets: 0, waiting: BTreeSet::new() };
+        Self { state: Mutex::new(state), moved: Condvar::new(), ahead: AtomicU64::new(Turn::MAX) }
+    }
+
+    /// Waits for a place.
+    pub fn enter(&self, turn: Turn) {
+        let mut state = self.state.lock();
+        state.tickets += 1;
+        let me = (turn, state.tickets);
+        state.waiting.insert(me);
+        while state.free == 0 || state.waiting.first() != Some(&me) {
+            self.hint(&state);
+            self.moved.wait(&mut state);
+        }
+        state.waiting.remove(&me);
+        state.free -= 1;
+        self.hint(&state);
+        if state.free > 0 {
+            self.moved.notify_all();
+        }
+    }
+
+    /// Gives the place back.
+    pub fn leave(&self) {
+        self.state.lock().free += 1;
+        self.moved.notify_all();
+    }
+
+    /// Called from inside: lets those ahead of `turn` pass.
+    pub fn let_pass(&self, turn: Turn) {
+        if self.ahead.load(Ordering::Relaxed) < turn {
+            self.leave();
+            self.enter(turn);
+        }
+    }
+
+    fn hint(&self, state: &State) {
+        let first = state.waiting.first().map_or(Turn::MAX, |w| w.0);
+        self.ahead.store(first, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicUsize;
+
+    #[test]
+    fn never_more_inside_than_places() {
+        let (turnstile, inside, most) = (Turnstile::new(3), AtomicUsize::new(0), AtomicUsize::new(0));
+        std::thread::scope(|s| {
+            for turn in 0..12 {
+                let (turnstile, inside, most) = (&turnstile, &inside, &most);
+                s.spawn(move || {
+                    for _ in 0..200 {
+                        turnstile.enter(turn);
+                        most.fetch_max(inside.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+                        inside.fetch_sub(1, Ordering::SeqCst);
+                        turnstile.let_pass(turn);
+                        turnstile.leave();
+                    }
+                });
+            }
+        });
+        assert!((1..=3).contains(&most.into_inner()));
+        assert_eq!(turnstile.state.lock().free, 3);
+    }
+
+    #[test]
+    fn who_is_ahead_passes_at_a_safe_point() {
+        let turnstile = Turnstile::new(1);
+        let order = Mutex::new(Vec::new());
+        turnstile.enter(50);
+        std::thread::scope(|s| {
+            for turn in [90, 10, 70] {
+                let (turnstile, order) = (&turnstile, &order);
+                s.spawn(move || {
+                    turnstile.enter(turn);
+                    order.lock().push(turn);
+                    turnstile.leave();
+                });
+            }
+            while turnstile.state.lock().waiting.len() < 3 {
+                std::thread::yield_now();
+            }
+            turnstile.let_pass(50);
+            order.lock().push(50);
+            turnstile.leave();
+        });
+        assert_eq!(order.into_inner(), [10, 50, 70, 90]);
+    }
+}

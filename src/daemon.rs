@@ -1,0 +1,198 @@
+//! The daemon: what is seen in the inbox becomes jobs, what is asked from outside is done.
+
+use crate::conveyor::{Conveyor, Ended};
+use crate::inbox::{Change, Inbox};
+use crate::job::{End, Job};
+use crate::settings::Settings;
+use crate::status::{Counts, Lock, NAMED, Progress, Status};
+use crate::watch::{Event, Eyes, Stop};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
+
+/// A job that could not be ended is tried again after this.
+const AGAIN: Duration = Duration::from_secs(30);
+
+/// The status is told at most this often.
+const TELL: Duration = Duration::from_millis(500);
+
+/// How long jobs have to reach a safe point when the daemon stops.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// What the daemon is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Watching,
+    /// Finishing what waits.
+    Draining,
+    /// Waiting until the cancelled jobs have reached a safe point; at most until then.
+    Stopping(Instant),
+}
+
+/// The daemon.
+pub struct Daemon<'a> {
+    settings: &'a Settings,
+    conveyor: &'a Conveyor,
+    lock: &'a Lock,
+    staging: &'a Path,
+    eyes: Eyes,
+    inbox: Inbox,
+    jobs: BTreeMap<PathBuf, Arc<Job>>,
+    phase: Phase,
+    status: Status,
+    next_look: Instant,
+    next_tell: Instant,
+    /// Whether something may have changed since the status was told.
+    untold: bool,
+}
+
+impl<'a> Daemon<'a> {
+    /// A daemon that watches the folder `inbox`.
+    pub fn new(
+        inbox: &Path,
+        settings: &'a Settings,
+        conveyor: &'a Conveyor,
+        (lock, staging): (&'a Lock, &'a Path),
+    ) -> Self {
+        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs());
+        let status =
+            Status { pid: std::process::id(), inbox: inbox.to_string_lossy().into_owned(), since, ..Status::default() };
+        let now = Instant::now();
+        Self {
+            settings,
+            conveyor,
+            lock,
+            staging,
+            eyes: Eyes::new(inbox, settings.recursive, settings.poll),
+            inbox: Inbox::default(),
+            jobs: BTreeMap::new(),
+            phase: Phase::Watching,
+            status,
+            next_look: now,
+            next_tell: now,
+            untold: true,
+        }
+    }
+
+    /// Watches until it is asked to stop, and has stopped. Returns what has ended.
+    pub fn run(mut self, stop: &Stop) -> Counts {
+        loop {
+            let now = Instant::now();
+            if self.phase == Phase::Watching && now >= self.next_look {
+                self.look(now);
+            }
+            if now >= self.next_tell && (self.untold || !self.jobs.is_empty()) {
+                self.tell(now);
+            }
+            let event = self.next_event(stop);
+            self.untold |= !matches!(event, Event::Tick);
+            match event {
+                Event::Hint => self.next_look = self.next_look.min(self.eyes.rested()),
+                Event::Ended(ended) => self.ended(*ended),
+                Event::Stop => self.stop(),
+                Event::Tick => {}
+            }
+            let over = match self.phase {
+                Phase::Watching => false,
+                Phase::Draining => self.jobs.is_empty(),
+                Phase::Stopping(latest) => self.jobs.is_empty() || Instant::now() >= latest,
+            };
+            if over {
+                return self.status.ended;
+            }
+        }
+    }
+
+    fn next_event(&self, stop: &Stop) -> Event {
+        let mut wake = match self.phase {
+            Phase::Watching => self.next_look,
+            Phase::Draining => Instant::now() + TELL,
+            Phase::Stopping(latest) => latest,
+        };
+        if self.untold || !self.jobs.is_empty() {
+            wake = wake.min(self.next_tell);
+        }
+        self.eyes.wait(self.conveyor, stop, wake)
+    }
+
+    /// Looks at the inbox, and does what follows from that.
+    fn look(&mut self, now: Instant) {
+        if let Some(listing) = self.eyes.look() {
+            self.untold |= self.inbox.due().is_some();
+            for change in self.inbox.look(&listing, now) {
+                self.follow(change);
+            }
+        }
+        let regular = now + self.eyes.period();
+        self.next_look = self.inbox.due().map_or(regular, |due| due.min(regular)).max(self.eyes.rested());
+    }
+
+    fn follow(&mut self, change: Change) {
+        match change {
+            Change::Settled(name, look) => {
+                tracing::debug!(input = %name.display(), bytes = look.bytes, "settled");
+                let job = Arc::new(Job::of_inbox(self.eyes.inbox(), &name, look));
+                self.jobs.insert(name, job.clone());
+                self.conveyor.submit(job);
+            }
+            Change::Withdrawn(name) => {
+                if let Some(job) = self.jobs.remove(&name) {
+                    tracing::info!(input = %name.display(), "changed or removed: the job is cancelled");
+                    job.cancel();
+                }
+            }
+        }
+    }
+
+    fn ended(&mut self, Ended { job, end }: Ended) {
+        if let End::Done(done) | End::Unchained(done, _) = &end
+            && !done.up_to_date
+        {
+            self.status.ended.count(done.report.status);
+        }
+        // A withdrawn job says nothing about the file that has its name now.
+        if self.jobs.get(&job.name).is_some_and(|current| Arc::ptr_eq(current, &job)) {
+            self.jobs.remove(&job.name);
+            let look = job.look.unwrap_or_else(|| unreachable!("jobs of an inbox have one"));
+            match end {
+                End::Done(_) => self.inbox.done(&job.name, &look),
+                End::Changed => self.inbox.again(&job.name, &look, Instant::now() + Duration::from_secs(1)),
+                End::Unwanted | End::Unwritten(_) | End::Unchained(..) | End::Lost => {
+                    self.inbox.again(&job.name, &look, Instant::now() + AGAIN);
+                }
+            }
+            self.next_look = self.inbox.due().map_or(self.next_look, |due| due.min(self.next_look));
+        }
+    }
+
+    /// The first time politely, then at once.
+    fn stop(&mut self) {
+        self.conveyor.close();
+        if self.settings.drain && self.phase == Phase::Watching {
+            tracing::info!(inputs = self.jobs.len(), "told to stop: finishes what waits; told again, it stops at once");
+            self.phase = Phase::Draining;
+        } else if !matches!(self.phase, Phase::Stopping(_)) {
+            tracing::info!(inputs = self.jobs.len(), "told to stop: the next start does what is not done");
+            self.jobs.values().for_each(|job| job.cancel());
+            self.phase = Phase::Stopping(Instant::now() + PATIENCE);
+        } else {
+            self.phase = Phase::Stopping(Instant::now());
+        }
+        self.next_tell = Instant::now();
+    }
+
+    fn tell(&mut self, now: Instant) {
+        let waiting = self.conveyor.waiting();
+        self.status.draining = self.phase != Phase::Watching;
+        self.status.waiting = waiting.len();
+        self.status.next = waiting.iter().take(NAMED).map(|job| job.name.to_string_lossy().into_owned()).collect();
+        self.status.running = self.conveyor.running().into_iter().map(Progress::from).collect();
+        self.status.unsettled = self.inbox.unsettled();
+        if let Err(error) = self.lock.tell(&self.status, self.staging) {
+            tracing::warn!("the status for `planish status` cannot be written: {error}");
+        }
+        self.next_tell = now + TELL;
+        self.untold = false;
+    }
+}

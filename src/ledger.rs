@@ -1,0 +1,78 @@
+//! The ledger: which inputs are done. There is no other one than the published reports.
+
+use crate::outcome::{Reason, Status};
+use crate::report::{self, Output, Report};
+use crate::stages::read_file;
+use serde::Deserialize;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use walkdir::{DirEntry, WalkDir};
+
+/// The report published in `folder`, if it is that of the same content, settings and version as `fresh`, and its files
+/// are there, unharmed. A failure is none: another version may do better, or another day.
+pub fn up_to_date(folder: &Path, fresh: &Report) -> Option<Report> {
+    let older: Report = serde_json::from_slice(&read_file(&folder.join(report::FILE)).ok()?).ok()?;
+    let same = older.input == fresh.input
+        && fresh.input.blake3.is_some()
+        && older.settings == fresh.settings
+        && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
+        && older.status != Status::Failed;
+    let there = |o: &Output| read_file(&folder.join(&o.file)).is_ok_and(|content| Output::of(&o.file, &content) == *o);
+    let complete = (older.status == Status::Certified) != older.outputs.is_empty();
+    (same && complete && older.outputs.iter().all(there)).then_some(older)
+}
+
+/// What a report says, in short.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Entry {
+    /// How the input ended.
+    pub status: Status,
+    /// Why, where it is not certified.
+    pub reason: Option<Reason>,
+}
+
+/// All results in the output folder `out`: their names and what their reports say, in the order of names.
+pub fn entries(out: &Path) -> impl Iterator<Item = (PathBuf, Entry)> {
+    let is_hidden = |e: &DirEntry| e.depth() > 0 && e.file_name().to_string_lossy().starts_with('.');
+    let mut folders = WalkDir::new(out).sort_by_file_name().into_iter();
+    let out = out.to_owned();
+    std::iter::from_fn(move || {
+        // Ends where the folder does.
+        loop {
+            let Ok(found) = folders.next()? else { continue };
+            if is_hidden(&found) && found.file_type().is_dir() {
+                folders.skip_current_dir();
+            } else if found.file_name() == report::FILE {
+                folders.skip_current_dir();
+                let entry = File::open(found.path()).ok().and_then(|f| serde_json::from_reader(BufReader::new(f)).ok());
+                let name = found.path().parent().and_then(|p| p.strip_prefix(&out).ok()).map(Path::to_owned);
+                if let Some(pair) = name.zip(entry) {
+                    return Some(pair);
+                }
+            }
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_results_are_found_and_nothing_else() {
+        let out = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| {
+            let folder = out.path().join(name);
+            std::fs::create_dir_all(&folder).expect("made");
+            std::fs::write(folder.join(report::FILE), text).expect("written");
+        };
+        write("b.stl", r#"{"status": "certified", "reason": null, "more": [1]}"#);
+        let reason = r#"{"code": "empty_file", "message": "m", "where": null}"#;
+        write("a/c.stl", &format!(r#"{{"status": "refused", "reason": {reason}}}"#));
+        write(".planish/run-1/d.stl", r#"{"status": "certified", "reason": null}"#);
+        write("broken.stl", "{");
+        let found: Vec<_> = entries(out.path()).map(|(name, e)| (name.display().to_string(), e.status)).collect();
+        assert_eq!(found, [("a/c.stl".to_owned(), Status::Refused), ("b.stl".to_owned(), Status::Certified)]);
+    }
+}

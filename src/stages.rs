@@ -1,0 +1,247 @@
+//! What each stage does with an input: values in, values out. The threads are in [`crate::conveyor`].
+
+use crate::formats::{self, Kind, vtm, vtp, vtu};
+use crate::hand_off;
+use crate::job::Stopped;
+use crate::outcome::{Code, Reason, Status};
+use crate::report::{self, Decomposition, Output, Report};
+use crate::settings::{self, Settings};
+use pipeline::atlas::{Atlas, Chart};
+use pipeline::decompose::{self, split_ears};
+use pipeline::distortion::{self, CellFields};
+use pipeline::host::{Alone, Host};
+use pipeline::mesh::{SurfaceMesh, TriangleSoup};
+use pipeline::repair::Repaired;
+use pipeline::seams::SeamNetwork;
+use pipeline::{
+    CertifiedChart, MapError, MappedChart, SplitError, finish_or_split, linear, map_or_split, repair, sparse,
+};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// The files of a result: names and contents.
+pub type Files = Vec<(String, Vec<u8>)>;
+
+/// Does `work`; a panic in it is a failure of this input, not of the program.
+///
+/// # Errors
+/// Those of `work`, and [`Code::Internal`] for a panic.
+pub fn guard<T, E: From<Reason>>(work: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
+        let message = "planish broke down on this input: that is a fault of planish; please report it with the file";
+        Err(Reason::new(Code::Internal, message).into())
+    })
+}
+
+/// Reads a regular file whole. Anything else (a folder, a pipe, a device) could block for ever.
+pub fn read_file(path: &Path) -> Result<Vec<u8>, Reason> {
+    let unreadable = |why: String| Reason::new(Code::Unreadable, format!("cannot read the file: {why}"));
+    let metadata = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?;
+    if !metadata.is_file() {
+        return Err(unreadable("it is no regular file".to_owned()));
+    }
+    std::fs::read(path).map_err(|e| unreadable(e.to_string()))
+}
+
+/// Decodes the bytes of the file at `path` by its extension.
+///
+/// # Errors
+/// The refusal, with the place and what to do.
+pub fn decode(path: &Path, bytes: &[u8]) -> Result<TriangleSoup, Reason> {
+    let refuse = |code, message: String| Err(Reason { code, message, place: Some("file name".to_owned()) });
+    match formats::kind(path) {
+        Kind::Mesh(format) => formats::read(format, bytes).map_err(|e| e.reason()),
+        Kind::OtherMesh(e) => refuse(
+            Code::UnsupportedFormat,
+            format!("this version reads .stl and .obj, not .{e}; convert the file to one of these"),
+        ),
+        Kind::NoMesh => {
+            refuse(Code::NotAMesh, "a file of this name holds no mesh; name an .stl or .obj file".to_owned())
+        }
+        Kind::Unknown(e) if e.is_empty() => refuse(
+            Code::UnknownExtension,
+            "the file name has no extension; rename the file to end in .stl or .obj, whichever it is".to_owned(),
+        ),
+        Kind::Unknown(e) => refuse(
+            Code::UnknownExtension,
+            format!("the extension .{e} is not known; planish reads .stl and .obj: rename or convert the file"),
+        ),
+    }
+}
+
+/// Repairs a soup as the settings say.
+///
+/// # Errors
+/// The refusal, where nothing is left.
+pub fn repaired(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Reason> {
+    let found = repair(soup, &pipeline::repair::Settings { weld: settings.weld });
+    found.map_err(|e| Reason::new(Code::OnlyDegenerate, e))
+}
+
+/// Repairs a soup and cuts it into charts; completes the report.
+///
+/// # Errors
+/// The refusal, or that the result is no longer wanted.
+pub fn cut(
+    soup: &TriangleSoup,
+    settings: &Settings,
+    report: &mut Report,
+    host: &dyn Host,
+) -> Result<(SurfaceMesh, Vec<Chart>), Stopped> {
+    let found = repaired(soup, settings)?;
+    report.surface = Some(report::surface(&found));
+    report.repairs = Some(report::repairs(&found.report));
+    let atlas = pipeline::decompose(&found.mesh, &settings.decompose(), host).map_err(not_cut)?;
+    let feature_edges = atlas.feature_edges();
+    report.decomposition = Some(Decomposition { feature_edges, ..Decomposition::default() });
+    let without = split_ears(&found.mesh, &atlas, settings.decompose().max_triangles);
+    Ok(match without.map_err(internal)? {
+        Some(done) => {
+            report.decomposition.iter_mut().for_each(|d| d.ears_split = done.split);
+            (done.mesh, done.atlas.into_charts())
+        }
+        None => (found.mesh, atlas.into_charts()),
+    })
+}
+
+fn not_cut(error: decompose::Error) -> Stopped {
+    match error {
+        decompose::Error::Cancelled => Stopped::Unwanted,
+        fault @ decompose::Error::Illegal(_) => internal(fault).into(),
+    }
+}
+
+fn internal(fault: impl std::fmt::Display) -> Reason {
+    Reason::new(Code::Internal, format!("{fault}: that is a fault of planish; please report it with the file"))
+}
+
+/// Maps a chart, splitting it where it must be.
+///
+/// # Errors
+/// The refusal of a chart that cannot be mapped, not even split, or that the result is no longer wanted.
+pub fn map(
+    mesh: &SurfaceMesh,
+    chart: Chart,
+    settings: &Settings,
+    host: &dyn Host,
+) -> Result<Vec<(Chart, MappedChart)>, Stopped> {
+    map_or_split(mesh, chart, settings.order, &settings.decompose(), host).map_err(not_mapped)
+}
+
+/// Untangles and certifies a chart, splitting it where it must be.
+///
+/// # Errors
+/// As [`map`].
+pub fn untangle(
+    mesh: &SurfaceMesh,
+    (chart, mapped): (Chart, MappedChart),
+    settings: &Settings,
+    host: &dyn Host,
+) -> Result<Vec<(Chart, CertifiedChart)>, Stopped> {
+    finish_or_split(mesh, chart, mapped, settings.order, &settings.decompose(), host).map_err(not_mapped)
+}
+
+fn not_mapped(error: SplitError) -> Stopped {
+    let code = match &error {
+        SplitError::Cancelled | SplitError::Split(decompose::Error::Cancelled) => return Stopped::Unwanted,
+        SplitError::Map(MapError::Linear(linear::Error::Solver(sparse::Error::TooLarge { .. }))) => Code::TooLarge,
+        SplitError::Map(_) => Code::NeedsSplit,
+        SplitError::Split(_) => Code::Internal,
+    };
+    Reason::new(code, error).into()
+}
+
+/// Puts the charts of a surface together, `whole` of which decomposition made; completes the report, and returns the
+/// files of the result.
+///
+/// # Errors
+/// Where the result cannot be encoded: a fault of planish.
+pub fn assemble(
+    mesh: &SurfaceMesh,
+    done: Vec<(Chart, CertifiedChart)>,
+    whole: usize,
+    settings: &Settings,
+    report: &mut Report,
+) -> Result<Files, Reason> {
+    let (mut charts, done): (Vec<Chart>, Vec<CertifiedChart>) = done.into_iter().unzip();
+    Atlas::renumber(&mut charts);
+    report.decomposition.iter_mut().for_each(|d| d.charts_by_splitting = charts.len() - whole);
+    let network = SeamNetwork::new(mesh, &charts);
+    let fields: Vec<_> = charts.iter().zip(&done).map(|(c, d)| distortion::fields(c, &d.certified)).collect();
+    for ((chart, done), fields) in charts.iter().zip(&done).zip(&fields) {
+        warn_if_unsolved(chart, done);
+        let summary = distortion::summary(chart, &done.certified, fields);
+        report.charts.push(report::chart_report(chart, &network, done, fields, &summary));
+    }
+    report.seams = report::seams(&network);
+    let mut files = encode(mesh, &charts, &done, &fields, &network)?;
+    if settings.hand_off == settings::HandOff::Gmsh {
+        let handed = hand_off::gmsh(mesh, &charts, &done, &network, settings.size);
+        files.extend(handed.files);
+        report.hand_off = Some(handed.report);
+    }
+    report.status = Status::Certified;
+    report.outputs = files.iter().map(|(name, content)| Output::of(name, content)).collect();
+    Ok(files)
+}
+
+/// Maps the charts of an atlas that was made otherwise, and puts them together; returns the files of its result and
+/// completes the report.
+///
+/// # Errors
+/// The refusal, where a chart cannot be mapped.
+pub fn finish(found: &Repaired, atlas: Atlas, settings: &Settings, report: &mut Report) -> Result<Files, Stopped> {
+    report.surface = Some(report::surface(found));
+    report.repairs = Some(report::repairs(&found.report));
+    report.decomposition = Some(Decomposition::default());
+    let whole = atlas.charts().len();
+    let mut done = Vec::new();
+    for chart in atlas.into_charts() {
+        for mapped in map(&found.mesh, chart, settings, &Alone)? {
+            done.extend(untangle(&found.mesh, mapped, settings, &Alone)?);
+        }
+    }
+    Ok(assemble(&found.mesh, done, whole, settings, report)?)
+}
+
+fn warn_if_unsolved(chart: &Chart, done: &CertifiedChart) {
+    if let Some(error) = &done.unsolved {
+        tracing::warn!(chart = %chart.id(), "no harmonic map ({error}): the linear one, raised, is published");
+    }
+}
+
+/// Encodes what ParaView shows.
+fn encode(
+    mesh: &SurfaceMesh,
+    charts: &[Chart],
+    done: &[CertifiedChart],
+    fields: &[Vec<CellFields>],
+    network: &SeamNetwork,
+) -> Result<Files, Reason> {
+    let none = |chart: &Chart| vec![false; chart.triangles().len()];
+    let invalid = |(c, d): (&_, &CertifiedChart)| d.harmonic.as_ref().map_or(none(c), |h| h.invalid.clone());
+    let untangled: Vec<Vec<bool>> = charts.iter().zip(done).map(invalid).collect();
+    let view = |i: usize| vtu::ChartView {
+        mesh,
+        chart: &charts[i],
+        map: &done[i].certified,
+        fields: &fields[i],
+        untangled: &untangled[i],
+        colour: network.colours()[i],
+    };
+    let views: Vec<_> = (0..charts.len()).map(view).collect();
+    let files = [
+        ("surface.vtu", vtu::surface(&views).map_err(not_encoded)?),
+        ("param.vtu", vtu::param(&views).map_err(not_encoded)?),
+        ("seams.vtp", vtp::seams(mesh, network).map_err(not_encoded)?),
+        ("atlas.vtm", vtm::blocks(&ATLAS)),
+    ];
+    Ok(files.map(|(name, content)| (name.to_owned(), content)).into())
+}
+
+/// The blocks of atlas.vtm.
+const ATLAS: [(&str, &str); 3] = [("surface", "surface.vtu"), ("param", "param.vtu"), ("seams", "seams.vtp")];
+
+fn not_encoded(error: impl std::fmt::Display) -> Reason {
+    Reason::new(Code::Internal, format!("the result cannot be encoded: {error}"))
+}

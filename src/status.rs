@@ -1,0 +1,220 @@
+//! What a running daemon does, for `planish status`; and the lock that lets one daemon only write to an output folder.
+//!
+//! The daemon writes `OUT/.planish/status.json` when something has changed, and removes it when it ends. That it runs is
+//! told by its lock on `OUT/.planish/watch.lock`, which the system takes back even where the daemon was killed.
+
+use crate::conveyor::board::Running;
+use crate::outcome::{Code, Status as Outcome};
+use crate::publish::STAGING;
+use serde::{Deserialize, Serialize};
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// The file whose lock the daemon holds.
+const LOCK_FILE: &str = "watch.lock";
+
+/// The file that tells what the daemon does.
+const STATUS: &str = "status.json";
+
+/// Names of waiting inputs that are told; all are counted.
+pub const NAMED: usize = 100;
+
+/// What a daemon does.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Status {
+    /// Its process number.
+    pub pid: u32,
+    /// The folder that it watches.
+    pub inbox: String,
+    /// When it began: seconds since 1970.
+    pub since: u64,
+    /// Whether it was told to stop, and finishes what waits.
+    pub draining: bool,
+    /// How many inputs wait.
+    pub waiting: usize,
+    /// The first of them.
+    pub next: Vec<String>,
+    /// Inputs on their way.
+    pub running: Vec<Progress>,
+    /// Files that have not settled yet.
+    pub unsettled: usize,
+    /// What has ended since it began.
+    pub ended: Counts,
+}
+
+/// An input on its way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Progress {
+    /// The name of its result.
+    pub name: String,
+    /// The last stage that it has reached.
+    pub stage: String,
+    /// Its charts that are certified.
+    pub charts_done: usize,
+    /// All its charts; 0 as long as they are not known.
+    pub charts: usize,
+    /// For how long, in seconds.
+    pub seconds: f64,
+}
+
+impl From<Running> for Progress {
+    fn from(running: Running) -> Self {
+        Self {
+            name: running.name.to_string_lossy().into_owned(),
+            stage: running.stage.name().to_owned(),
+            charts_done: running.charts_done,
+            charts: running.charts,
+            seconds: (running.since.elapsed().as_secs_f64() * 10.0).round() / 10.0,
+        }
+    }
+}
+
+/// How many inputs ended how.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Certified.
+    pub certified: usize,
+    /// Refused.
+    pub refused: usize,
+    /// Failed.
+    pub failed: usize,
+}
+
+impl Counts {
+    /// One more.
+    pub fn count(&mut self, outcome: Outcome) {
+        *match outcome {
+            Outcome::Certified => &mut self.certified,
+            Outcome::Refused => &mut self.refused,
+            Outcome::Failed => &mut self.failed,
+        } += 1;
+    }
+}
+
+/// A refused or failed input.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Refusal {
+    /// The name of its result.
+    pub name: String,
+    /// `refused` or `failed`.
+    pub status: Outcome,
+    /// Why.
+    pub code: Option<Code>,
+    /// Why, for people.
+    pub message: String,
+}
+
+/// Why the daemon cannot have the output folder.
+#[derive(Debug, thiserror::Error)]
+pub enum LockError {
+    /// Another one has it.
+    #[error("another planish watch{} writes to {out} already; stop it first, or use another output folder", of_process(.pid))]
+    Busy {
+        /// The output folder.
+        out: PathBuf,
+        /// The other one, as it told.
+        pid: Option<u32>,
+    },
+    /// The system refuses.
+    #[error("cannot lock {path}: {error}")]
+    Io {
+        /// The lock file.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+}
+
+fn of_process(pid: &Option<u32>) -> String {
+    pid.map_or(String::new(), |pid| format!(" (process {pid})"))
+}
+
+/// The one daemon of an output folder.
+#[derive(Debug)]
+pub struct Lock {
+    status: PathBuf,
+    _lock: File,
+}
+
+impl Lock {
+    /// Locks the output folder, which is there already.
+    ///
+    /// # Errors
+    /// [`LockError`].
+    pub fn take(out: &Path) -> Result<Self, LockError> {
+        let path = out.join(STAGING).join(LOCK_FILE);
+        let failed = |error| LockError::Io { path: path.clone(), error };
+        let lock = File::options().create(true).append(true).open(&path).map_err(failed)?;
+        match try_lock(&lock) {
+            Ok(()) => Ok(Self { status: out.join(STAGING).join(STATUS), _lock: lock }),
+            Err(TryLockError::WouldBlock) => {
+                Err(LockError::Busy { out: out.to_owned(), pid: told(out).map(|status| status.pid) })
+            }
+            Err(TryLockError::Error(error)) => Err(failed(error)),
+        }
+    }
+
+    /// Tells what the daemon does.
+    ///
+    /// # Errors
+    /// Where the file cannot be written.
+    pub fn tell(&self, status: &Status, staging: &Path) -> io::Result<()> {
+        let mut file = tempfile::NamedTempFile::new_in(staging)?;
+        serde_json::to_writer(&mut file, status)?;
+        file.flush()?;
+        file.persist(&self.status).map(drop).map_err(|e| e.error)
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // It may never have been written.
+        let _ = fs::remove_file(&self.status);
+    }
+}
+
+/// Tries a few times: who asks whether a daemon runs holds the lock for a moment.
+fn try_lock(lock: &File) -> Result<(), TryLockError> {
+    for _ in 0..5 {
+        match lock.try_lock() {
+            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(20)),
+            ended => return ended,
+        }
+    }
+    lock.try_lock()
+}
+
+/// What the last daemon told; none: it ended in order, or there never was one.
+pub fn told(out: &Path) -> Option<Status> {
+    serde_json::from_slice(&fs::read(out.join(STAGING).join(STATUS)).ok()?).ok()
+}
+
+/// Whether a daemon runs.
+pub fn is_running(out: &Path) -> bool {
+    let lock = File::open(out.join(STAGING).join(LOCK_FILE));
+    lock.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_daemon_only_and_it_tells_what_it_does() {
+        let out = tempfile::tempdir().expect("a folder");
+        let staging = out.path().join(STAGING);
+        fs::create_dir(&staging).expect("made");
+        assert!(!is_running(out.path()));
+        let daemon = Lock::take(out.path()).expect("free");
+        assert!(is_running(out.path()));
+        let status = Status { pid: 42, waiting: 3, ..Status::default() };
+        daemon.tell(&status, &staging).expect("written");
+        assert_eq!(told(out.path()), Some(status));
+        assert!(matches!(Lock::take(out.path()), Err(LockError::Busy { pid: Some(42), .. })));
+        drop(daemon);
+        assert!(!is_running(out.path()) && told(out.path()).is_none());
+        Lock::take(out.path()).expect("free again");
+    }
+}

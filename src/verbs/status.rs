@@ -1,0 +1,101 @@
+//! `planish status`: what a running daemon does.
+
+use super::{Exit, say, shown};
+use crate::ledger;
+use crate::outcome::Status as Outcome;
+use crate::settings::Settings;
+use crate::status::{self, Counts, Progress, Refusal, Status};
+use serde::Serialize;
+use std::path::Path;
+
+/// Refusals that are named for people; `--json` names all.
+const NAMED: usize = 10;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Answer {
+    /// Whether a daemon runs.
+    running: bool,
+    /// What it told last; also what one told that was killed.
+    daemon: Option<Status>,
+    /// All results in the output folder.
+    results: Counts,
+    /// Those that are not certified.
+    refusals: Vec<Refusal>,
+}
+
+/// Tells what the daemon does that writes to the output folder, and what results there are.
+///
+/// # Errors
+/// Wrong usage.
+pub fn status(json: bool, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
+    let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
+    std::fs::read_dir(out).map_err(|e| format!("cannot read the output folder {}: {e}", out.display()))?;
+    let answer = answer(out);
+    say(&if json { serde_json::to_string(&answer)? } else { text(&answer) });
+    Ok(if answer.running { Exit::Success } else { Exit::Refused })
+}
+
+fn answer(out: &Path) -> Answer {
+    let mut results = Counts::default();
+    let mut refusals = Vec::new();
+    for (name, entry) in ledger::entries(out) {
+        results.count(entry.status);
+        if entry.status != Outcome::Certified {
+            let (code, message) = entry.reason.map_or((None, String::new()), |r| (Some(r.code), r.message));
+            refusals.push(Refusal { name: name.to_string_lossy().into_owned(), status: entry.status, code, message });
+        }
+    }
+    Answer { running: status::is_running(out), daemon: status::told(out), results, refusals }
+}
+
+/// The answer for people.
+fn text(answer: &Answer) -> String {
+    let mut lines = vec![headline(answer)];
+    if let Some(daemon) = &answer.daemon {
+        lines.push(format!(
+            "{} wait, {} run, {} have not settled",
+            daemon.waiting,
+            daemon.running.len(),
+            daemon.unsettled
+        ));
+        lines.extend(daemon.running.iter().map(progress));
+        lines.extend(daemon.next.iter().take(NAMED).map(|name| format!("  {:12} {}", "waits", plain(name))));
+        lines.extend((daemon.waiting > NAMED).then(|| format!("  and {} more", daemon.waiting - NAMED)));
+    }
+    let Counts { certified, refused, failed } = answer.results;
+    lines.push(format!("results: {certified} certified, {refused} refused, {failed} failed"));
+    lines.extend(answer.refusals.iter().take(NAMED).map(refusal));
+    let more = answer.refusals.len().saturating_sub(NAMED);
+    lines.extend((more > 0).then(|| format!("  and {more} more; --json lists all")));
+    lines.join("\n")
+}
+
+fn headline(answer: &Answer) -> String {
+    match (&answer.daemon, answer.running) {
+        (Some(daemon), true) => {
+            let doing = if daemon.draining { "finishes what waits, from" } else { "watches" };
+            format!("a daemon (process {}) {doing} {}", daemon.pid, plain(&daemon.inbox))
+        }
+        (None, true) => "a daemon is about to begin".to_owned(),
+        (Some(daemon), false) => {
+            format!("no daemon runs: the last one (process {}) was killed while it did this:", daemon.pid)
+        }
+        (None, false) => "no daemon runs".to_owned(),
+    }
+}
+
+fn progress(job: &Progress) -> String {
+    let charts = if job.charts > 0 { format!("{} of {} charts, ", job.charts_done, job.charts) } else { String::new() };
+    format!("  {:12} {}: {charts}{:.1} s", job.stage, plain(&job.name), job.seconds)
+}
+
+fn refusal(refusal: &Refusal) -> String {
+    let code = refusal.code.map_or(String::new(), |code| format!(" [{}]", code.name()));
+    format!("  {:12} {}: {}{code}", refusal.status, plain(&refusal.name), refusal.message)
+}
+
+/// A name on one line, whatever its characters.
+fn plain(name: &str) -> String {
+    shown(name.as_ref())
+}

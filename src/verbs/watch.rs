@@ -1,0 +1,43 @@
+//! `planish watch`: the daemon.
+
+use super::Exit;
+use crate::conveyor::Conveyor;
+use crate::daemon::Daemon;
+use crate::places::{self, Place};
+use crate::publish::Publisher;
+use crate::put_away;
+use crate::settings::{Inputs, Settings};
+use crate::signals;
+use crate::status::Lock;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Watches the folder `inbox` until it is told to stop.
+///
+/// # Errors
+/// What makes the call as a whole impossible: wrong usage, a second daemon.
+pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
+    let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
+    std::fs::read_dir(inbox).map_err(|e| format!("cannot watch {}: {e}; make the folder first", inbox.display()))?;
+    places::refuse_nested(&places(inbox, out, settings))?;
+    let publisher = Arc::new(Publisher::open(out)?);
+    let lock = Lock::take(out)?;
+    put_away::recover(inbox)?;
+    let stop = signals::listen()?;
+    let conveyor = Conveyor::start(settings, publisher.clone())?;
+    tracing::info!(inbox = %inbox.display(), out = %out.display(), "watches");
+    let ended = Daemon::new(inbox, settings, &conveyor, (&lock, publisher.staging())).run(&stop);
+    // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more.
+    publisher.close();
+    tracing::info!(certified = ended.certified, refused = ended.refused, failed = ended.failed, "stopped");
+    Ok(Exit::Success)
+}
+
+/// The folders that must not lie in each other.
+fn places<'a>(inbox: &'a Path, out: &'a Path, settings: &'a Settings) -> Vec<Place<'a>> {
+    let mut all = vec![Place::new("inbox", inbox), Place::new("output folder", out)];
+    if let Inputs::Move(folder) = &settings.inputs {
+        all.push(Place::new("folder for inputs", folder));
+    }
+    all
+}

@@ -1,0 +1,244 @@
+//! `planish watch`: the real program, fed, disturbed, stopped and killed.
+
+mod chaining;
+mod dropping;
+mod killing;
+mod many;
+mod stopping;
+
+use crate::support::Out;
+use planish::outcome::Status;
+use planish::report::Output;
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus};
+use std::time::{Duration, Instant};
+
+/// Nothing here takes a tenth of this; a test that waits longer has failed.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// An inbox, an output folder, and perhaps a daemon between them. All goes when the test ends.
+pub struct Watched {
+    folder: tempfile::TempDir,
+    pub out: Out,
+    args: Vec<String>,
+    daemon: Option<Child>,
+}
+
+impl Watched {
+    /// With these arguments for every start.
+    pub fn new(args: &[&str]) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::create_dir(folder.path().join("in")).expect("made");
+        let args = args.iter().map(ToString::to_string).collect();
+        Self { folder, out: Out::new(), args, daemon: None }
+    }
+
+    /// With this settings file.
+    pub fn configured(toml: &str, args: &[&str]) -> Self {
+        let mut watched = Self::new(args);
+        let config = watched.beside("planish.toml");
+        fs::write(&config, toml).expect("written");
+        watched.args.extend(["--config".to_owned(), config.display().to_string()]);
+        watched
+    }
+
+    pub fn inbox(&self) -> PathBuf {
+        self.folder.path().join("in")
+    }
+
+    /// A path beside the inbox.
+    pub fn beside(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Puts a file into the inbox at once, by a rename.
+    pub fn drop_in(&self, name: &str, bytes: &[u8]) {
+        let path = self.beside("on-its-way");
+        fs::write(&path, bytes).expect("written");
+        fs::rename(path, self.inbox().join(name)).expect("moved in");
+    }
+
+    /// `planish watch` with its log in a file.
+    fn command(&self) -> Command {
+        let log = File::options().create(true).append(true).open(self.beside("log")).expect("a log");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_planish"));
+        command.arg("watch").arg(self.inbox()).arg("--out").arg(self.out.path()).args(["--log", "json"]);
+        command.args(&self.args).stderr(log);
+        command
+    }
+
+    pub fn start(&mut self) {
+        self.start_with(|command| command);
+    }
+
+    pub fn start_with(&mut self, change: impl Fn(&mut Command) -> &mut Command) {
+        assert!(self.daemon.is_none(), "one at a time");
+        let mut command = self.command();
+        change(&mut command);
+        self.daemon = Some(command.spawn().expect("starts"));
+    }
+
+    pub fn pid(&self) -> u32 {
+        self.daemon.as_ref().expect("it runs").id()
+    }
+
+    /// Sends the daemon a signal, by its name.
+    pub fn signal(&self, name: &str) {
+        let sent = Command::new("kill").args(["-s", name, &self.pid().to_string()]).status().expect("kill");
+        assert!(sent.success());
+    }
+
+    /// Waits until the daemon has ended.
+    pub fn wait(&mut self) -> ExitStatus {
+        let daemon = self.daemon.as_mut().expect("it runs");
+        let since = Instant::now();
+        loop {
+            if let Some(status) = daemon.try_wait().expect("a child") {
+                self.daemon = None;
+                return status;
+            }
+            if since.elapsed() > PATIENCE {
+                panic!("the daemon does not end\n{}", self.log());
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// Kills the daemon as the system does when memory is short.
+    pub fn kill(&mut self) {
+        let mut daemon = self.daemon.take().expect("it runs");
+        daemon.kill().expect("killed");
+        daemon.wait().expect("a child");
+    }
+
+    /// Asks the daemon to stop, and sees that it ends well.
+    pub fn stop(&mut self) {
+        self.signal("TERM");
+        let status = self.wait();
+        assert_eq!(status.code(), Some(0), "{}", self.log());
+    }
+
+    pub fn log(&self) -> String {
+        fs::read_to_string(self.beside("log")).unwrap_or_default()
+    }
+
+    /// How often a message was logged about an input.
+    pub fn logged(&self, input: &str, message: &str) -> usize {
+        let log = self.log();
+        let lines = log.lines().filter_map(|l| serde_json::from_str::<Value>(l).ok());
+        let about = |l: &Value| l["spans"].as_array().is_some_and(|all| all.iter().any(|s| s["input"] == input));
+        let says = |l: &Value| l["fields"]["message"].as_str().is_some_and(|m| m.starts_with(message));
+        lines.filter(|l| about(l) && says(l)).count()
+    }
+
+    /// Waits until something is so.
+    pub fn wait_until(&self, what: &str, is_so: impl Fn(&Self) -> bool) {
+        let since = Instant::now();
+        while !is_so(self) {
+            assert!(since.elapsed() < PATIENCE, "waited in vain until {what}\n{}", self.log());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Waits until every input has a result from exactly these bytes.
+    pub fn wait_for(&self, inputs: &[(&str, &[u8])]) {
+        for (name, bytes) in inputs {
+            self.wait_until(&format!("{name} is done"), |w| w.is_done(name, bytes));
+        }
+    }
+
+    pub fn is_done(&self, name: &str, bytes: &[u8]) -> bool {
+        let Ok(text) = fs::read(self.out.of(name).join("report.json")) else { return false };
+        let report: Value = serde_json::from_slice(&text).expect("reports are whole");
+        report["input"]["blake3"] == blake3::hash(bytes).to_hex().as_str()
+    }
+
+    /// What the daemon tells, as `planish status` reads it.
+    pub fn status(&self) -> Value {
+        fs::read(self.out.path().join(".planish/status.json"))
+            .ok()
+            .and_then(|text| serde_json::from_slice(&text).ok())
+            .unwrap_or_default()
+    }
+
+    /// Whether an input is on its way, and has reached a stage behind reading.
+    pub fn is_running(&self, name: &str) -> bool {
+        let status = self.status();
+        let running = status["running"].as_array().cloned().unwrap_or_default();
+        running.iter().any(|job| job["name"] == name && job["stage"] != "read")
+    }
+
+    /// Whether the result of an input is complete: every file of it there with its size and hash, and no other.
+    pub fn assert_complete(&self, name: &str, status: Status) {
+        let report = self.out.report(name);
+        assert_eq!(report.status, status, "{name}: {:?}", report.reason);
+        let mut expected: BTreeSet<String> = report.outputs.iter().map(|o| o.file.clone()).collect();
+        assert_eq!(expected.is_empty(), status != Status::Certified, "{name}");
+        for output in &report.outputs {
+            assert_eq!(Output::of(&output.file, &self.out.read(name, &output.file)), *output, "{name}");
+        }
+        expected.insert("report.json".to_owned());
+        assert_eq!(names(&self.out.of(name)), expected, "{name}: nothing stray");
+    }
+
+    /// Whether the output folder holds the results of these inputs and nothing else; and, when no daemon runs, no
+    /// staging folder is left.
+    pub fn assert_tidy(&self, inputs: &[&str]) {
+        let mut expected: BTreeSet<String> = inputs.iter().map(ToString::to_string).collect();
+        expected.insert(".planish".to_owned());
+        assert_eq!(names(self.out.path()), expected);
+        if self.daemon.is_none() {
+            let staging = names(&self.out.path().join(".planish"));
+            assert_eq!(staging.iter().collect::<Vec<_>>(), ["opening", "watch.lock"]);
+        }
+    }
+}
+
+impl Drop for Watched {
+    fn drop(&mut self) {
+        if let Some(mut daemon) = self.daemon.take() {
+            let _ = daemon.kill();
+            let _ = daemon.wait();
+        }
+    }
+}
+
+/// The names in a folder.
+pub fn names(folder: &Path) -> BTreeSet<String> {
+    let name = |e: fs::DirEntry| e.file_name().to_string_lossy().into_owned();
+    fs::read_dir(folder).expect("a folder").flatten().map(name).collect()
+}
+
+/// A disk with bumps, as a binary STL: about 6 n^2 triangles. Different `twist`s are different surfaces.
+pub fn disk(n: u32, twist: f64) -> Vec<u8> {
+    let soup = pipeline::shapes::disk(n);
+    let point = |i: u32| soup.points()[i as usize].map(|x| (x * (1.0 + 1e-3 * twist)) as f32);
+    let mut bytes = vec![0_u8; 80];
+    bytes.extend((soup.triangles().len() as u32).to_le_bytes());
+    for t in soup.triangles() {
+        bytes.extend([0; 12]);
+        t.iter().flat_map(|v| point(*v)).for_each(|x| bytes.extend(x.to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+/// Writes a file in pieces, with pauses.
+pub fn write_slowly(path: &Path, bytes: &[u8], pieces: usize, pause: Duration) {
+    let mut file = File::create(path).expect("made");
+    for piece in bytes.chunks(bytes.len().div_ceil(pieces)) {
+        file.write_all(piece).expect("written");
+        file.flush().expect("written");
+        std::thread::sleep(pause);
+    }
+}
+
+/// Runs a command of the system.
+pub fn run(program: impl AsRef<OsStr>, args: &[&OsStr]) {
+    assert!(Command::new(program).args(args).status().expect("runs").success());
+}

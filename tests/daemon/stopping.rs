@@ -1,0 +1,75 @@
+//! Asked to stop, politely or not.
+
+use super::{Watched, disk};
+use planish::outcome::Status;
+use std::time::{Duration, Instant};
+
+#[test]
+fn the_daemon_ends_within_seconds_wherever_its_jobs_are() {
+    let mut w = Watched::new(&["--jobs", "2"]);
+    let large = [0.0, 1.0, 2.0].map(|twist| disk(220, twist));
+    for (i, bytes) in large.iter().enumerate() {
+        w.drop_in(&format!("large-{i}.stl"), bytes);
+    }
+    for (round, signal) in ["TERM", "INT", "TERM", "HUP", "TERM", "TERM"].into_iter().enumerate() {
+        w.start();
+        w.wait_until("a job is on its way", |w| (0..3).any(|i| w.is_running(&format!("large-{i}.stl"))));
+        std::thread::sleep(Duration::from_millis(300 * round as u64));
+        let since = Instant::now();
+        w.signal(signal);
+        assert_eq!(w.wait().code(), Some(0), "{}", w.log());
+        // The promise itself: the one place where a test looks at the clock.
+        assert!(since.elapsed() < Duration::from_secs(5), "{signal}: {:?}", since.elapsed());
+        let done: Vec<String> = (0..3).map(|i| format!("large-{i}.stl")).filter(|n| w.out.of(n).exists()).collect();
+        let done: Vec<&str> = done.iter().map(String::as_str).collect();
+        done.iter().for_each(|name| w.assert_complete(name, Status::Certified));
+        w.assert_tidy(&done);
+        if done.len() == 3 {
+            break;
+        }
+    }
+}
+
+#[test]
+fn what_waits_is_finished_first_when_asked_for() {
+    let mut w = Watched::new(&["--drain", "--jobs", "1"]);
+    let inputs: Vec<(String, Vec<u8>)> =
+        (0..8).map(|i| (format!("{i}.stl"), disk(if i == 0 { 120 } else { 12 }, f64::from(i)))).collect();
+    inputs.iter().for_each(|(name, bytes)| w.drop_in(name, bytes));
+    w.start();
+    w.wait_until("the first is on its way", |w| w.is_running("0.stl"));
+    w.stop();
+    let names: Vec<&str> = inputs.iter().map(|(name, _)| name.as_str()).collect();
+    names.iter().for_each(|name| w.assert_complete(name, Status::Certified));
+    w.assert_tidy(&names);
+    // Asked twice, it does not finish.
+    w.drop_in("0.stl", &disk(220, 9.0));
+    w.start();
+    w.wait_until("it is on its way", |w| w.is_running("0.stl"));
+    w.signal("TERM");
+    w.wait_until("it drains", |w| w.status()["draining"] == true);
+    let since = Instant::now();
+    w.stop();
+    assert!(since.elapsed() < Duration::from_secs(5));
+    w.assert_complete("0.stl", Status::Certified);
+    assert!(w.is_done("0.stl", &inputs[0].1), "the older result stays");
+}
+
+/// `planish run` is interrupted the same way.
+#[test]
+fn a_run_that_is_interrupted_publishes_nothing_half() {
+    let w = Watched::new(&[]);
+    let paths: Vec<_> = (0..2).map(|i| w.inbox().join(format!("{i}.stl"))).collect();
+    paths.iter().zip([6, 250]).for_each(|(path, n)| std::fs::write(path, disk(n, 0.0)).expect("written"));
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_planish"));
+    command.arg("run").args(&paths).arg("--out").arg(w.out.path()).stdout(std::process::Stdio::piped());
+    let run = command.spawn().expect("starts");
+    w.wait_until("the small one is done", |w| w.out.of("0.stl").exists());
+    super::run("kill", &[run.id().to_string().as_ref()]);
+    let output = run.wait_with_output().expect("ends");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.code() == Some(1) && said.contains("interrupted"), "{said}");
+    w.assert_complete("0.stl", Status::Certified);
+    assert_eq!(super::names(w.out.path()).len(), 2, "the other result is not there");
+    assert_eq!(super::names(&w.out.path().join(".planish")).len(), 1, "nor anything on its way");
+}
