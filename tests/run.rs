@@ -95,6 +95,9 @@ fn wrong_usage_is_exit_code_2_and_does_nothing() {
         ["--size", "0"],
         ["--hand-off", "mmg"],
         ["--config", "no/such.toml"],
+        ["--jobs", "0"],
+        ["--memory", "1MiB"],
+        ["--memory", "much"],
     ];
     for extra in wrong {
         assert_eq!(out.run(&[&disk], &extra).code, Some(2), "{extra:?}");
@@ -152,6 +155,27 @@ fn results_are_the_same_bytes_every_time() {
             assert!(first.read(name, &output.file) == second.read(name, &output.file), "{name}/{}", output.file);
         }
     }
+}
+
+/// Threads, turns and budgets decide when something is done, never what comes out.
+#[test]
+fn jobs_and_memory_do_not_change_a_byte() {
+    let outs = [(1, "16MiB"), (5, "16MiB"), (3, "4GiB")].map(|(jobs, memory)| {
+        let out = Out::new();
+        let names = ["bent_disk.stl", "plate_genus9.stl", "sphere.stl", "finger.obj"];
+        let inputs = names.map(fixture);
+        let inputs: Vec<&Path> = inputs.iter().map(|p| p.as_path()).collect();
+        let extra = ["--jobs", &jobs.to_string(), "--memory", memory, "--max-triangles", "900"];
+        assert_eq!(out.run(&inputs, &extra).code, Some(0));
+        let files = names.map(|name| {
+            let report = out.report(name);
+            let hashes: Vec<String> = report.outputs.iter().map(|o| o.blake3.clone()).collect();
+            assert!(name != "bent_disk.stl" || report.charts.len() > 7, "many charts on their way at once");
+            (out.timeless(name), hashes)
+        });
+        files
+    });
+    assert!(outs[0] == outs[1] && outs[0] == outs[2]);
 }
 
 #[test]
@@ -237,8 +261,15 @@ fn logs_are_lines_of_json_when_asked_for() {
     let ended = out.run(&[&fixture("disk.stl")], &["-v", "--log", "json"]);
     let lines: Vec<serde_json::Value> =
         ended.err.lines().map(|l| serde_json::from_str(l).expect("a JSON object per line")).collect();
-    let said = |what: &str| lines.iter().any(|l| l["fields"]["message"] == what && l["span"]["input"] == "disk.stl");
-    assert!(said("begins") && said("ends"), "{}", ended.err);
+    let spans = |what: &str| {
+        let line = lines.iter().find(|l| l["fields"]["message"] == what);
+        let spans = line.and_then(|l| l["spans"].as_array()).cloned().unwrap_or_default();
+        spans.iter().map(|s| s["input"].as_str().or(s["stage"].as_str()).unwrap_or("?").to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        (spans("begins"), spans("ends")),
+        (vec!["disk.stl".to_owned()], vec!["disk.stl".to_owned(), "write".to_owned()])
+    );
     assert_eq!(out.run(&[&fixture("disk.stl")], &["--force"]).err, "", "silent without -v");
 }
 

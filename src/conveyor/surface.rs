@@ -71,3 +71,33 @@ impl Surface {
         (parts.report.clone(), parts.stopped.take().map_or(Ok(done), |(_, why)| Err(why)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::travel::tests::{begin, shared};
+    use super::*;
+    use crate::outcome::{Code, Reason};
+    use crate::report::Input;
+    use pipeline::{repair, shapes};
+
+    /// Which part stops a job does not depend on which thread was first.
+    #[test]
+    fn the_first_part_that_stops_a_job_is_the_reason_in_any_order() {
+        let (shared, _ended, _out) = shared(1 << 20);
+        let refusal = |place: Place| Stopped::For(Reason::new(Code::NeedsSplit, format!("{place:?}")));
+        let places = [(2, 0), (0, 1), (1, 0)];
+        for turn in 0..3 {
+            let mesh = repair(&shapes::disk(2), &Default::default()).expect("a surface").mesh;
+            let input = Input { name: "a.stl".to_owned(), bytes: None, blake3: None };
+            let surface = Surface::new(begin(&shared), mesh, 3, Report::new(input, &shared.settings));
+            surface.expect(1);
+            let mut order = places;
+            order.rotate_left(turn);
+            assert!(!surface.deposit((0, 0), Ok(vec![])));
+            let last: Vec<bool> = order.iter().map(|p| surface.deposit(*p, Err(refusal(*p)))).collect();
+            assert_eq!(last, [false, false, true]);
+            assert!(surface.is_due((0, 0)) && !surface.is_due((0, 2)));
+            assert_eq!(surface.collect().1.expect_err("stopped"), refusal((0, 1)));
+        }
+    }
+}

@@ -78,7 +78,7 @@ impl Travel {
 
     /// Log messages until the end of what is returned are those of this job and stage.
     pub fn in_stage(&self, stage: Stage) -> impl Drop {
-        self.span.in_scope(|| tracing::info_span!("stage", name = stage.name())).entered()
+        self.span.in_scope(|| tracing::info_span!("stage", stage = stage.name())).entered()
     }
 
     /// Tells that the job has come so far.
@@ -155,4 +155,88 @@ impl Host for Seat<'_> {
 fn cpu_seconds() -> f64 {
     let t = clock_gettime(ClockId::ThreadCPUTime);
     t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::outcome::Code;
+    use crate::settings::Said;
+    use crossbeam_channel::{Receiver, bounded};
+
+    /// What threads share, with an output folder that goes with it.
+    pub fn shared(memory: u64) -> (Arc<Shared>, Receiver<Ended>, tempfile::TempDir) {
+        let out = tempfile::tempdir().expect("a folder");
+        let (ended, to_tell) = bounded(8);
+        let shared = Shared {
+            settings: Said::default().check().expect("in range"),
+            publisher: Arc::new(Publisher::open(out.path()).expect("opens")),
+            queue: Queue::default(),
+            turnstile: Turnstile::new(1),
+            budget: Budget::new(memory),
+            board: Board::default(),
+            ended,
+        };
+        (Arc::new(shared), to_tell, out)
+    }
+
+    pub fn begin(shared: &Arc<Shared>) -> Arc<Travel> {
+        let job = Arc::new(Job::new("a.stl".into(), "a.stl".into(), 100));
+        Travel::begin(shared, Waiting { job, turn: 1 })
+    }
+
+    #[test]
+    fn a_panic_is_a_failure_of_its_job_and_what_it_held_is_given_back() {
+        let (shared, ended, _out) = shared(1 << 20);
+        let travel = begin(&shared);
+        assert_eq!(shared.board.running().len(), 1);
+        let stopped = travel.compute(Stage::Map, |host| -> Result<(), Stopped> {
+            let _held = pipeline::host::Reserved::new(host, 1 << 19);
+            panic!("a fault, for the test");
+        });
+        assert!(matches!(stopped, Err(Stopped::For(reason)) if reason.code == Code::Internal));
+        // Place and memory are free again; and nobody told how the job ended.
+        assert_eq!(travel.compute(Stage::Map, |_| Ok(7)), Ok(7));
+        assert!(shared.budget.try_take(Account::Factor, 1 << 19));
+        drop(travel);
+        assert!(matches!(ended.try_recv().expect("told").end, End::Lost));
+        assert!(ended.try_recv().is_err() && shared.board.running().is_empty());
+        shared.budget.give_back(Account::Factor, 1 << 19);
+        assert!(shared.budget.try_take(Account::Input, 1 << 20), "the memory for its data, too");
+    }
+
+    #[test]
+    fn what_nobody_wants_is_not_computed_or_dropped() {
+        let (shared, ended, _out) = shared(1 << 20);
+        let travel = begin(&shared);
+        let stopped = travel.compute(Stage::Map, |host| {
+            assert!(host.go_on());
+            travel.job.cancel();
+            assert!(!host.go_on());
+            Ok(())
+        });
+        assert_eq!(stopped, Err(Stopped::Unwanted));
+        assert_eq!(travel.compute(Stage::Map, |_| -> Result<(), _> { unreachable!() }), Err(Stopped::Unwanted));
+        travel.end(End::Unwanted);
+        drop(travel);
+        assert!(matches!(ended.try_recv().expect("told").end, End::Unwanted));
+    }
+
+    /// A job that waits for memory has left the turnstile: who holds the memory can go on.
+    #[test]
+    fn who_waits_for_memory_does_not_keep_others_from_computing() {
+        let (shared, _ended, _out) = shared(1 << 20);
+        let travels = [begin(&shared), begin(&shared)];
+        let rounds = |travel: &Arc<Travel>| {
+            for _ in 0..200 {
+                let done = travel.compute(Stage::Map, |host| {
+                    let _held = pipeline::host::Reserved::new(host, 3 << 18);
+                    host.go_on();
+                    Ok(())
+                });
+                assert_eq!(done, Ok(()));
+            }
+        };
+        std::thread::scope(|s| travels.each_ref().map(|t| s.spawn(|| rounds(t))).map(|t| t.join().expect("ends")));
+    }
 }

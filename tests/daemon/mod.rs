@@ -9,9 +9,9 @@ mod stopping;
 use crate::support::Out;
 use planish::outcome::Status;
 use planish::report::Output;
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::collections::BTreeSet;
-use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -87,10 +87,8 @@ impl Watched {
         self.daemon.as_ref().expect("it runs").id()
     }
 
-    /// Sends the daemon a signal, by its name.
-    pub fn signal(&self, name: &str) {
-        let sent = Command::new("kill").args(["-s", name, &self.pid().to_string()]).status().expect("kill");
-        assert!(sent.success());
+    pub fn signal(&self, signal: Signal) {
+        send(self.daemon.as_ref().expect("it runs"), signal);
     }
 
     /// Waits until the daemon has ended.
@@ -118,7 +116,7 @@ impl Watched {
 
     /// Asks the daemon to stop, and sees that it ends well.
     pub fn stop(&mut self) {
-        self.signal("TERM");
+        self.signal(Signal::TERM);
         let status = self.wait();
         assert_eq!(status.code(), Some(0), "{}", self.log());
     }
@@ -238,7 +236,7 @@ pub fn write_slowly(path: &Path, bytes: &[u8], pieces: usize, pause: Duration) {
     }
 }
 
-/// Runs a command of the system.
-pub fn run(program: impl AsRef<OsStr>, args: &[&OsStr]) {
-    assert!(Command::new(program).args(args).status().expect("runs").success());
+/// Sends a process a signal.
+pub fn send(process: &Child, signal: Signal) {
+    kill_process(Pid::from_child(process), signal).expect("sent");
 }

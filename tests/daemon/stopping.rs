@@ -2,6 +2,7 @@
 
 use super::{Watched, disk};
 use planish::outcome::Status;
+use rustix::process::Signal;
 use std::time::{Duration, Instant};
 
 #[test]
@@ -11,7 +12,9 @@ fn the_daemon_ends_within_seconds_wherever_its_jobs_are() {
     for (i, bytes) in large.iter().enumerate() {
         w.drop_in(&format!("large-{i}.stl"), bytes);
     }
-    for (round, signal) in ["TERM", "INT", "TERM", "HUP", "TERM", "TERM"].into_iter().enumerate() {
+    for (round, signal) in
+        [Signal::TERM, Signal::INT, Signal::TERM, Signal::HUP, Signal::TERM, Signal::TERM].into_iter().enumerate()
+    {
         w.start();
         w.wait_until("a job is on its way", |w| (0..3).any(|i| w.is_running(&format!("large-{i}.stl"))));
         std::thread::sleep(Duration::from_millis(300 * round as u64));
@@ -19,7 +22,7 @@ fn the_daemon_ends_within_seconds_wherever_its_jobs_are() {
         w.signal(signal);
         assert_eq!(w.wait().code(), Some(0), "{}", w.log());
         // The promise itself: the one place where a test looks at the clock.
-        assert!(since.elapsed() < Duration::from_secs(5), "{signal}: {:?}", since.elapsed());
+        assert!(since.elapsed() < Duration::from_secs(5), "{signal:?}: {:?}", since.elapsed());
         let done: Vec<String> = (0..3).map(|i| format!("large-{i}.stl")).filter(|n| w.out.of(n).exists()).collect();
         let done: Vec<&str> = done.iter().map(String::as_str).collect();
         done.iter().for_each(|name| w.assert_complete(name, Status::Certified));
@@ -46,7 +49,7 @@ fn what_waits_is_finished_first_when_asked_for() {
     w.drop_in("0.stl", &disk(220, 9.0));
     w.start();
     w.wait_until("it is on its way", |w| w.is_running("0.stl"));
-    w.signal("TERM");
+    w.signal(Signal::TERM);
     w.wait_until("it drains", |w| w.status()["draining"] == true);
     let since = Instant::now();
     w.stop();
@@ -65,7 +68,7 @@ fn a_run_that_is_interrupted_publishes_nothing_half() {
     command.arg("run").args(&paths).arg("--out").arg(w.out.path()).stdout(std::process::Stdio::piped());
     let run = command.spawn().expect("starts");
     w.wait_until("the small one is done", |w| w.out.of("0.stl").exists());
-    super::run("kill", &[run.id().to_string().as_ref()]);
+    super::send(&run, Signal::TERM);
     let output = run.wait_with_output().expect("ends");
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.code() == Some(1) && said.contains("interrupted"), "{said}");
