@@ -167,13 +167,12 @@ fn jobs_and_memory_do_not_change_a_byte() {
         let inputs: Vec<&Path> = inputs.iter().map(|p| p.as_path()).collect();
         let extra = ["--jobs", &jobs.to_string(), "--memory", memory, "--max-triangles", "900"];
         assert_eq!(out.run(&inputs, &extra).code, Some(0));
-        let files = names.map(|name| {
+        names.map(|name| {
             let report = out.report(name);
             let hashes: Vec<String> = report.outputs.iter().map(|o| o.blake3.clone()).collect();
             assert!(name != "bent_disk.stl" || report.charts.len() > 7, "many charts on their way at once");
             (out.timeless(name), hashes)
-        });
-        files
+        })
     });
     assert!(outs[0] == outs[1] && outs[0] == outs[2]);
 }
