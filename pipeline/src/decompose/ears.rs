@@ -34,7 +34,8 @@ pub fn split_ears(mesh: &SurfaceMesh, atlas: &Atlas, max_triangles: usize) -> Re
     }
     let sizes = atlas.charts().iter().map(|c| c.triangles().len()).collect();
     let left_alone = vec![false; mesh.triangles().len()];
-    let mut work = Work { mesh: mesh.clone(), labels, sizes, max_triangles, left_alone, split: 0 };
+    let fresh = mesh.welded.iter().max().map_or(0, |w| w + 1);
+    let mut work = Work { mesh: mesh.clone(), fresh, labels, sizes, max_triangles, left_alone, split: 0 };
     // A split ear is none any more, and its parts are none: every pass leaves fewer.
     while work.pass() {}
     if work.split == 0 {
@@ -55,6 +56,8 @@ pub fn split_ears(mesh: &SurfaceMesh, atlas: &Atlas, max_triangles: usize) -> Re
 /// A surface while its ears are split.
 struct Work {
     mesh: SurfaceMesh,
+    /// The number of the next vertex among the welded ones.
+    fresh: u32,
     labels: Vec<u32>,
     /// Per chart its triangles.
     sizes: Vec<usize>,
@@ -107,8 +110,8 @@ impl Work {
         self.sizes[self.labels[h.face().index()] as usize] = size;
         let [p, q] = [h, h.next()].map(|e| self.mesh.triangles[e.face().index()][e.side()].index());
         self.mesh.points.push(midpoint(self.mesh.points[p], self.mesh.points[q]));
-        let fresh = self.mesh.welded.iter().max().map_or(0, |w| w + 1);
-        self.mesh.welded.push(fresh);
+        self.mesh.welded.push(self.fresh);
+        self.fresh += 1;
         for (side, [first, second]) in [h, t].into_iter().zip(parts) {
             let face = side.face().index();
             (self.mesh.triangles[face], self.mesh.metric.shapes[face]) = first;
