@@ -100,3 +100,148 @@ impl<'a> Pace<'a> {
         self.after(WORK)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::boundary::{Boundary, Mids};
+    use crate::certify::PlanarMap;
+    use crate::closed::ClosedChart;
+    use crate::id::FaceId;
+    use crate::linear::mean_value_map;
+    use crate::mesh::{SurfaceMesh, TriangleSoup};
+    use crate::sparse::{self, Pattern, solve_general};
+    use crate::{Order, SplitError, decompose, finish_or_split, map_or_split, repair, shapes};
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+    use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
+
+    /// Says yes so many times, and keeps account of the memory.
+    struct Watchful {
+        patience: usize,
+        asked: AtomicUsize,
+        reserved: AtomicU64,
+        most: AtomicU64,
+    }
+
+    impl Watchful {
+        fn new(patience: usize) -> Self {
+            Self { patience, asked: AtomicUsize::new(0), reserved: AtomicU64::new(0), most: AtomicU64::new(0) }
+        }
+
+        /// How much was reserved at most; nothing must be left.
+        fn most(&self) -> usize {
+            assert_eq!(self.reserved.load(Relaxed), 0, "everything is given back");
+            self.most.load(Relaxed) as usize
+        }
+    }
+
+    impl Host for Watchful {
+        fn go_on(&self) -> bool {
+            assert_eq!(self.reserved.load(Relaxed), 0, "no safe point while memory is reserved");
+            self.asked.fetch_add(1, Relaxed) < self.patience
+        }
+
+        fn reserve(&self, bytes: u64) {
+            assert!(bytes > 0);
+            assert_eq!(self.reserved.swap(bytes, Relaxed), 0, "one reservation at a time");
+            self.most.fetch_max(bytes, Relaxed);
+        }
+
+        fn release(&self, bytes: u64) {
+            assert_eq!(self.reserved.swap(0, Relaxed), bytes);
+        }
+    }
+
+    fn surface(soup: &TriangleSoup) -> SurfaceMesh {
+        repair(soup, &Default::default()).expect("a surface").mesh
+    }
+
+    fn whole(mesh: &SurfaceMesh) -> ClosedChart {
+        let labels = vec![0; mesh.triangles().len()];
+        ClosedChart::new(&decompose::assemble(mesh, &labels).expect("one chart").charts()[0])
+    }
+
+    /// Per chart its triangles and its map.
+    type Maps = Vec<(Vec<FaceId>, PlanarMap)>;
+
+    /// The whole story.
+    fn maps(mesh: &SurfaceMesh, settings: &decompose::Settings, host: &dyn Host) -> Result<Maps, SplitError> {
+        let mut all = Vec::new();
+        for chart in decompose(mesh, settings, host)?.into_charts() {
+            for (chart, mapped) in map_or_split(mesh, chart, Order::Quadratic, settings, host)? {
+                let done = finish_or_split(mesh, chart, mapped, Order::Quadratic, settings, host)?;
+                all.extend(done.into_iter().map(|(c, d)| (c.faces().to_vec(), d.certified.map().clone())));
+            }
+        }
+        Ok(all)
+    }
+
+    #[test]
+    fn whatever_is_cancelled_ends_as_cancelled_and_whatever_is_not_does_not_depend_on_the_host() {
+        let ratio =
+            |max_area_ratio: f64| decompose::Settings { max_area_ratio, feature_angle: None, ..Default::default() };
+        for (soup, settings) in [
+            (shapes::ring_torus(30, 16), ratio(1e6)),
+            (shapes::sphere(20), decompose::Settings { strict_disks: true, ..ratio(30.0) }),
+            // Split and untangled; at the higher ratio split after that.
+            (shapes::bent_disk(20, 0.45, 1.0), ratio(1e3)),
+            (shapes::bent_disk(32, 0.45, 1.0), ratio(5e5)),
+            // With factors that are no small ones.
+            (shapes::disk_with_holes(49, 3), decompose::Settings::default()),
+            // The feasible path.
+            (shapes::folding_six(), ratio(1e6)),
+        ] {
+            let mesh = surface(&soup);
+            let patient = Watchful::new(usize::MAX);
+            let wanted = maps(&mesh, &settings, &Alone).expect("maps");
+            assert!(maps(&mesh, &settings, &patient).expect("maps") == wanted);
+            assert!(patient.most() > 0);
+            let asked = patient.asked.into_inner();
+            for patience in (0..asked).step_by(asked.div_ceil(6)).chain([asked - 1]) {
+                let host = Watchful::new(patience);
+                let got = maps(&mesh, &settings, &host);
+                assert!(matches!(got, Err(SplitError::Cancelled)), "after {patience} of {asked} answers");
+                host.most();
+            }
+            assert!(maps(&mesh, &settings, &Watchful::new(asked)).expect("maps") == wanted);
+        }
+    }
+
+    #[test]
+    fn a_factor_holds_its_memory_until_it_is_dropped() {
+        let spring = [[1.0, -1.0], [-1.0, 1.0]];
+        let fastened: Vec<[u32; 2]> = (0..50).map(|i| [i, if i == 0 { sparse::PRESCRIBED } else { i - 1 }]).collect();
+        for (elements, unknowns) in [(fastened, 50), (vec![[0, 1]], 2)] {
+            let pattern = Pattern::new(unknowns, &elements);
+            let mut values = pattern.zeros();
+            (0..elements.len()).for_each(|e| pattern.add(&mut values, e, &spring));
+            let analysis = pattern.analyse().expect("small");
+            let host = Watchful::new(usize::MAX);
+            match analysis.factorise(&values, &host) {
+                Ok(factor) => {
+                    assert!(host.reserved.load(Relaxed) as usize >= 8 * analysis.factor_entries());
+                    drop(factor);
+                }
+                Err(error) => assert_eq!(error, sparse::Error::Singular { unknowns: 2 }),
+            }
+            assert!(host.most() >= 8 * analysis.factor_entries());
+            let broken = catch_unwind(AssertUnwindSafe(|| {
+                let _factor = analysis.factorise(&values, &host);
+                panic!("while it is held");
+            }));
+            assert!(broken.is_err());
+            host.most();
+        }
+    }
+
+    #[test]
+    fn general_systems_reserve_an_estimate() {
+        let host = Watchful::new(usize::MAX);
+        let chart = whole(&surface(&shapes::disk(8)));
+        mean_value_map(&chart, &Boundary::circle(&chart, Mids::Arc), &host).expect("maps");
+        assert!(host.most() > 0);
+        let singular = [(0, 0, 1.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 1.0)];
+        assert!(solve_general(2, &singular, &mut [1.0, 2.0], 1, &host).is_err());
+        host.most();
+    }
+}

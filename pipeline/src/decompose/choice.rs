@@ -59,6 +59,7 @@ impl Choice<'_> {
         charts.of.iter().zip(&found.components.of).for_each(|(chart, c)| component[*chart as usize] = *c as usize);
         let labels = self.cells.of.iter().map(|c| charts.of[*c as usize]).collect();
         let mut network = Network::new(self.dual, labels, self.limits).keeping(RELAXED);
+        self.dual.visited_all()?;
         relax(&mut network, 1.0, |label| open[component[label as usize]]);
         self.dual.visited_all()?;
         let mut counts = vec![0; tried.len()];

@@ -86,7 +86,8 @@ fn along(a: &Place, b: &Place) -> f64 {
     }
 }
 
-/// Per vertex its distance from the nearest vertex on a seam or at the open boundary, and that vertex.
+/// Per vertex its distance from the nearest vertex on a seam or at the open boundary, and that vertex; as
+/// far as somebody waits for them.
 fn domains(network: &Network, places: &[Place]) -> (Vec<f64>, Vec<Option<u32>>) {
     let dual = network.dual;
     let (mut distance, mut owner) = (vec![f64::INFINITY; places.len()], vec![None; places.len()]);
@@ -98,6 +99,9 @@ fn domains(network: &Network, places: &[Place]) -> (Vec<f64>, Vec<Option<u32>>) 
     while let Some(At { distance: so_far, node }) = heap.pop() {
         if so_far > distance[node as usize] {
             continue;
+        }
+        if !dual.pace.goes_on(1) {
+            break;
         }
         network.each_out(node as usize, |h: HalfEdgeId| {
             let (to, length) = (dual.to(h), so_far + dual.length(h));

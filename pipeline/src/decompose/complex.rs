@@ -267,7 +267,7 @@ mod tests {
         let meshes: Vec<SurfaceMesh> = soups.iter().chain([&shapes::finger(12, 2)]).map(surface).collect();
         for (mesh, count) in meshes.iter().flat_map(|m| [3, 7, 25, 60].map(|count| (m, count))) {
             let dual = Dual::new(mesh, &Alone);
-            let cells = compact_cells(&dual, |_| count);
+            let cells = compact_cells(&dual, |_| count, &dual.pace).expect("nobody cancels");
             let complex = Complex::new(&dual, &cells);
             let mut random = Random(count as u64);
             let mut regions = Regions::new(&complex, (0..cells.count as u32).collect(), cells.count);
@@ -297,7 +297,8 @@ mod tests {
             let mesh = surface(&soup);
             let dual = Dual::new(&mesh, &Alone);
             for count in [1, 2, 9, 40] {
-                let complex = Complex::new(&dual, &compact_cells(&dual, |_| count));
+                let complex =
+                    Complex::new(&dual, &compact_cells(&dual, |_| count, &dual.pace).expect("nobody cancels"));
                 for (a, arc) in complex.arcs.iter().enumerate() {
                     assert_eq!(complex.arcs[arc.next as usize].cell, arc.cell);
                     let Some(twin) = complex.arcs.get(arc.twin as usize) else { continue };

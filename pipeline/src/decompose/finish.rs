@@ -41,6 +41,7 @@ pub(super) fn finish(
     for (round, band) in bands.iter().enumerate() {
         dual.visited_all()?;
         let gaps = gaps(&best.network);
+        dual.visited_all()?;
         let clear = |h: HalfEdgeId| SHARE * gaps.clearance[dual.from(h)].min(gaps.clearance[dual.to(h)]);
         let breadth = |h: HalfEdgeId| clear(h).min(band * size(h));
         let step = Step { cells, largest: settings.max_area_ratio, gaps: &gaps, shrink: round == 0 };

@@ -6,7 +6,7 @@
 
 use super::complex::Complex;
 use super::network::Network;
-use super::predict::{CellGraph, area_ratio};
+use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
 use super::regions::Regions;
 use super::voronoi::Cells;
 use crate::atlas::Atlas;
@@ -30,7 +30,8 @@ pub(super) fn judge(network: &Network, cells: &Cells) -> Vec<Option<Verdict>> {
     let graph = CellGraph::new(&complex);
     let mut regions = Regions::new(&complex, labels, network.label_count());
     let verdict = |label: usize| {
-        let outline = regions.outline_of(label as u32);
+        let work = WORK_PER_CELL * regions.all[label].cells.len();
+        let outline = network.dual.pace.goes_on(work).then(|| regions.outline_of(label as u32))?;
         let (ratio, outer) = area_ratio(&complex, &graph, &regions.all[label].cells, &outline.loops);
         let arc = *outline.loops.get(outer)?.first()?;
         Some(Verdict { ratio, outer: complex.arcs[arc as usize].first })

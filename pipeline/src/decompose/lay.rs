@@ -228,7 +228,7 @@ mod tests {
         {
             let mesh = repair(&soup, &Settings::default()).expect("a surface is left").mesh;
             let dual = Dual::new(&mesh, &Alone);
-            let cells = compact_cells(&dual, |_| charts);
+            let cells = compact_cells(&dual, |_| charts, &dual.pace).expect("nobody cancels");
             let largest = 11 * mesh.triangles().len() / charts / 10;
             let limits = Limits { area_ratio: 1e6, triangles: largest, strict_disks: false };
             let mut network = Network::new(&dual, cells.of, limits);

@@ -83,6 +83,7 @@ impl Merge<'_, '_> {
         let mut version = vec![0_u32; self.regions.all.len()];
         let mut heap = BinaryHeap::new();
         for a in 0..version.len() as u32 {
+            self.pace.after(self.regions.all[a as usize].boundary.len())?;
             for b in self.regions.neighbours(a).into_iter().filter(|b| a < *b) {
                 heap.extend(self.candidate((a, b), &version));
             }

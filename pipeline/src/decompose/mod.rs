@@ -131,7 +131,7 @@ impl Limits {
 
 /// Legal cells of about the same size, and their complex.
 fn cells(dual: &Dual, limits: &Limits) -> Result<(Cells, Complex), Cancelled> {
-    let cells = compact_cells(dual, |size| (size / 8).min(CELLS));
+    let cells = compact_cells(dual, |size| (size / 8).min(CELLS), &dual.pace)?;
     dual.visited_all()?;
     let mut complex = Complex::default();
     let cells = bisect_until(dual, cells, |cells| {

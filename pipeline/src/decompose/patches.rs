@@ -6,6 +6,7 @@
 //! all seeds, and are as exact as if seeds had been chosen among nodes.
 
 use super::voronoi::{Cells, Graph, nearest, seeds};
+use crate::host::{Cancelled, Pace};
 
 /// Patches to a cell.
 const SAMPLES: usize = 16;
@@ -14,11 +15,17 @@ const NONE: u32 = u32::MAX;
 
 /// Cells of `graph`, numbered component by component: in a component of so many nodes `wanted` of them, or as many as
 /// it has nodes.
-pub(super) fn compact_cells<G: Graph>(graph: &G, wanted: impl Fn(usize) -> usize) -> Cells {
+pub(super) fn compact_cells<G: Graph>(
+    graph: &G,
+    wanted: impl Fn(usize) -> usize,
+    pace: &Pace,
+) -> Result<Cells, Cancelled> {
     let patches = Patches::new(graph, |size| size / (SAMPLES * wanted(size)).max(1));
+    pace.after(graph.len())?;
     let seeds = seeds(&patches, |part| wanted(part.iter().map(|p| patches.size(*p)).sum()));
     let nodes: Vec<usize> = seeds.iter().map(|p| patches.nodes[patches.starts[*p]] as usize).collect();
-    nearest(graph, &nodes)
+    pace.after(graph.len())?;
+    Ok(nearest(graph, &nodes))
 }
 
 /// Connected patches of nodes, and the graph of them.
@@ -140,7 +147,9 @@ mod tests {
     fn check(soup: &TriangleSoup, wanted: usize) {
         let mesh = repair(soup, &Settings::default()).expect("a surface is left").mesh;
         let dual = Dual::new(&mesh, &Alone);
-        for cells in [compact_cells(&dual, |_| wanted), farthest_first(&dual, |_| wanted)] {
+        for cells in
+            [compact_cells(&dual, |_| wanted, &dual.pace).expect("nobody cancels"), farthest_first(&dual, |_| wanted)]
+        {
             let mut seen = vec![false; dual.len()];
             let mut found = vec![false; cells.count];
             for start in 0..dual.len() {
@@ -174,7 +183,8 @@ mod tests {
     #[test]
     fn cells_of_one_size_on_an_even_plate() {
         let mesh = repair(&shapes::flat_disk(60), &Settings::default()).expect("a surface is left").mesh;
-        let cells = compact_cells(&Dual::new(&mesh, &Alone), |_| 50);
+        let dual = Dual::new(&mesh, &Alone);
+        let cells = compact_cells(&dual, |_| 50, &dual.pace).expect("nobody cancels");
         let mut sizes = vec![0; cells.count];
         cells.of.iter().for_each(|c| sizes[*c as usize] += 1);
         let mean = mesh.triangles().len() / 50;

@@ -296,7 +296,7 @@ impl<'n, 'a> Straightening<'n, 'a> {
 }
 
 /// The vertices on seams, and those no farther from one than `breadth` at one of its half-edges. Dijkstra by what is
-/// left of it.
+/// left of it, as long as somebody waits.
 fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Vec<bool> {
     let dual = network.dual;
     let mut left = vec![0.0_f64; dual.mesh.points().len()];
@@ -311,6 +311,9 @@ fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Vec<bool> {
     while let Some(At { distance, node }) = heap.pop() {
         if -distance < left[node as usize] {
             continue;
+        }
+        if !dual.pace.goes_on(1) {
+            break;
         }
         network.each_out(node as usize, |h| {
             let rest = -distance - dual.length(h);
