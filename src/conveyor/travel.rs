@@ -49,7 +49,8 @@ pub(super) struct Travel {
     end: Mutex<Option<End>>,
 }
 
-/// What an input takes per byte of its file from reading to writing: measured, see docs/memory in the tests.
+/// What an input takes per byte of its file from reading to writing, factors apart. Measured: 25 to 30 for binary STL,
+/// up to 45 for OBJ, 10 for ASCII STL.
 const MEMORY_PER_BYTE: u64 = 40;
 
 impl Travel {
