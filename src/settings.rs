@@ -1,116 +1,13 @@
 //! Settings: what the user may say, typed and checked in one place.
 
+mod values;
+
 use crate::hooks::{Hook, HookRefused};
 use bytesize::ByteSize;
 use pipeline::Order;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::path::{Path, PathBuf};
-
-/// The form of log messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "snake_case")]
-pub enum Log {
-    /// For people.
-    #[default]
-    Text,
-    /// One JSON object per line.
-    Json,
-}
-
-/// The meshers to which results are handed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "snake_case")]
-pub enum HandOff {
-    /// Gmsh: atlas.msh and remesh.geo.
-    #[default]
-    Gmsh,
-    /// None.
-    None,
-}
-
-/// The dihedral angle of feature edges.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(untagged)]
-pub enum FeatureAngle {
-    /// In degrees.
-    Degrees(f64),
-    /// No features.
-    Off(Off),
-}
-
-/// The word `off`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Off {
-    /// The word.
-    Off,
-}
-
-impl FeatureAngle {
-    fn degrees(self) -> Option<f64> {
-        if let Self::Degrees(angle) = self { Some(angle) } else { None }
-    }
-}
-
-impl std::str::FromStr for FeatureAngle {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text == "off" {
-            return Ok(Self::Off(Off::Off));
-        }
-        text.parse().map(Self::Degrees).map_err(|_| format!("{text} is neither an angle in degrees nor off"))
-    }
-}
-
-/// What becomes of inputs of `planish watch` that are certified, and on which all commands succeeded.
-#[derive(Clone, Debug, PartialEq, Eq, Default, Deserialize)]
-#[serde(try_from = "String")]
-pub enum Inputs {
-    /// They stay.
-    #[default]
-    Keep,
-    /// They are moved to this folder.
-    Move(PathBuf),
-    /// They are deleted.
-    Delete,
-}
-
-impl std::str::FromStr for Inputs {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match (text, text.strip_prefix("move:")) {
-            ("keep", _) => Ok(Self::Keep),
-            ("delete", _) => Ok(Self::Delete),
-            (_, Some(folder)) if !folder.is_empty() => Ok(Self::Move(folder.into())),
-            _ => Err(format!("{text} is none of keep, move:DIR and delete")),
-        }
-    }
-}
-
-impl TryFrom<String> for Inputs {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
-    }
-}
-
-/// A command that runs after an input is certified: a table `[[on_certified]]` of planish.toml (see docs/hooks.md).
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct OnCertified {
-    /// Program and arguments, with placeholders such as `{folder}`.
-    pub command: Vec<String>,
-    /// Wall-clock seconds after which it is ended; an hour where nothing is said.
-    #[serde(rename = "time-limit", default = "an_hour")]
-    pub time_limit: f64,
-}
-
-fn an_hour() -> f64 {
-    3600.0
-}
+pub use values::{FeatureAngle, HandOff, Inputs, Log, Off, OnCertified};
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
 /// the file alone.
