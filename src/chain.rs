@@ -33,8 +33,11 @@ pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publishe
     let hooks = &settings.on_certified;
     if hooks::are_due(hooks, &target) {
         tracing::info!(commands = hooks.len(), "runs commands");
-        if hooks::run(hooks, &target, publisher.staging(), &|| job.is_wanted())?.is_none() {
+        let Some(account) = hooks::run(hooks, &target, publisher.staging(), &|| job.is_wanted())? else {
             return Ok(false);
+        };
+        if account.failure().is_none() {
+            tracing::info!("commands have succeeded");
         }
     }
     let all_succeeded = hooks.is_empty() || hooks::account(&target).is_some_and(|a| a.failure().is_none());
