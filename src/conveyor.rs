@@ -22,6 +22,7 @@ mod travel;
 pub mod turnstile;
 
 use crate::chain;
+use crate::formats::Content;
 use crate::job::{Done, End, Job, Stage, Stopped};
 use crate::ledger;
 use crate::outcome::{Code, Reason, Status};
@@ -231,11 +232,14 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
             if settings.force { None } else { ledger::up_to_date(&publisher.target(&travel.job.name), &report) };
         Ok(match older {
             Some(older) => Err(older),
-            None => Ok(stages::decode(&travel.job.path, &bytes)?),
+            None => Ok(stages::decode(&travel.job.path, &bytes, settings)?),
         })
     });
     match decoded {
-        Ok(Ok(soup)) => hand_on(soups, Soup { travel, report, soup }),
+        Ok(Ok(Content { soup, notes })) => {
+            report.content = Some(notes);
+            hand_on(soups, Soup { travel, report, soup });
+        }
         Ok(Err(older)) => {
             let _in_stage = travel.in_stage(Stage::Read);
             tracing::info!(status = %older.status, "is up to date");

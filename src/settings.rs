@@ -2,6 +2,7 @@
 
 mod values;
 
+use crate::formats::Limits;
 use crate::hooks::{Hook, HookRefused};
 use bytesize::ByteSize;
 use pipeline::Order;
@@ -96,6 +97,8 @@ pub struct Settings {
     pub drain: bool,
     /// What becomes of certified inputs.
     pub inputs: Inputs,
+    /// What is too much for one input.
+    pub limits: Limits,
     /// Form of log messages.
     pub log: Log,
     /// 0 warns, 1 informs, 2 explains, 3 traces.
@@ -287,6 +290,7 @@ impl Said {
             recursive: self.recursive.unwrap_or(false),
             drain: self.drain.unwrap_or(false),
             inputs: self.inputs.unwrap_or_default(),
+            limits: Limits::default(),
             log: self.log.unwrap_or_default(),
             verbose: self.verbose.unwrap_or(0),
             quiet: self.quiet.unwrap_or(false),

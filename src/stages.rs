@@ -1,6 +1,6 @@
 //! What each stage does with an input: values in, values out. The threads are in [`crate::conveyor`].
 
-use crate::formats::{self, Kind, vtm, vtp, vtu};
+use crate::formats::{self, Beside, Content, Kind, Source, vtm, vtp, vtu};
 use crate::hand_off;
 use crate::job::Stopped;
 use crate::outcome::{Code, Reason, Status};
@@ -47,10 +47,13 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, Reason> {
 ///
 /// # Errors
 /// The refusal, with the place and what to do.
-pub fn decode(path: &Path, bytes: &[u8]) -> Result<TriangleSoup, Reason> {
+pub fn decode(path: &Path, bytes: &[u8], settings: &Settings) -> Result<Content, Reason> {
     let refuse = |code, message: String| Err(Reason { code, message, place: Some("file name".to_owned()) });
     match formats::kind(path) {
-        Kind::Mesh(format) => formats::read(format, bytes).map_err(|e| e.reason()),
+        Kind::Mesh(format) => {
+            let source = Source { bytes, limits: &settings.limits, beside: &Folder(path) };
+            formats::read(format, &source).map_err(|e| e.reason())
+        }
         Kind::OtherMesh(e) => refuse(
             Code::UnsupportedFormat,
             format!("this version reads .stl and .obj, not .{e}; convert the file to one of these"),
@@ -66,6 +69,23 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<TriangleSoup, Reason> {
             Code::UnknownExtension,
             format!("the extension .{e} is not known; planish reads .stl and .obj: rename or convert the file"),
         ),
+    }
+}
+
+/// The folder of the file at this path.
+struct Folder<'a>(&'a Path);
+
+impl Beside for Folder<'_> {
+    fn read(&self, name: &str, most: u64) -> Result<Vec<u8>, String> {
+        let path = self.0.with_file_name(name);
+        let metadata = std::fs::symlink_metadata(&path).map_err(|e| format!("{name}: {e}"))?;
+        if !metadata.is_file() {
+            return Err(format!("{name} is no regular file"));
+        }
+        if metadata.len() > most {
+            return Err(format!("{name} has {} bytes, more than {most}", metadata.len()));
+        }
+        std::fs::read(&path).map_err(|e| format!("{name}: {e}"))
     }
 }
 

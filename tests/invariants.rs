@@ -58,7 +58,7 @@ fn charts_and_energies_stay() {
     };
     for (name, content) in generate::all() {
         let Kind::Mesh(format) = formats::kind(name.as_ref()) else { panic!("a mesh") };
-        let soup = formats::read(format, &content).expect("readable");
+        let soup = formats::read_alone(format, &content).expect("readable").soup;
         let copies = [
             ("scaled down", moved(&soup, |p| p.map(|c| c * 1e-8))),
             ("scaled up", moved(&soup, |p| p.map(|c| c * 1e8))),

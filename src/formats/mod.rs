@@ -1,5 +1,6 @@
 //! File formats: which there are, and reading a soup of triangles from the bytes of a file.
 
+mod content;
 pub mod gmsh;
 mod obj;
 mod polygon;
@@ -9,7 +10,8 @@ pub mod vtp;
 pub mod vtu;
 
 use crate::outcome::{Code, Reason};
-use pipeline::mesh::{SoupError, TriangleSoup};
+pub use content::{Beside, Content, Limits, Notes, Nothing, Source};
+use pipeline::mesh::SoupError;
 use std::path::Path;
 
 /// A format that can be read.
@@ -98,7 +100,8 @@ fn soup_reason(error: &SoupError) -> (Code, Option<String>) {
 ///
 /// # Errors
 /// [`ReadError`], with the place and what to do.
-pub fn read(format: Format, bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
+pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
+    let bytes = source.bytes;
     if bytes.is_empty() {
         return Err(ReadError::Empty);
     }
@@ -106,6 +109,14 @@ pub fn read(format: Format, bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
         Format::Stl => stl::read(bytes),
         Format::Obj => obj::read(bytes),
     }
+}
+
+/// As [`read`], with the usual limits and nothing beside the file.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_alone(format: Format, bytes: &[u8]) -> Result<Content, ReadError> {
+    read(format, &Source { bytes, limits: &Limits::default(), beside: &Nothing })
 }
 
 #[cfg(test)]
@@ -126,7 +137,7 @@ mod tests {
 
     #[test]
     fn an_empty_file_is_refused_with_its_place() {
-        let reason = read(Format::Stl, b"").expect_err("empty").reason();
+        let reason = read_alone(Format::Stl, b"").expect_err("empty").reason();
         assert_eq!((reason.code, reason.place.as_deref()), (Code::EmptyFile, Some("byte 0")));
     }
 }

@@ -6,7 +6,7 @@
 //! and texture coordinates that nobody needs.) Polygons are cut into triangles; vertices keep the numbers they have in
 //! the file.
 
-use super::{ReadError, polygon};
+use super::{Content, Notes, ReadError, polygon};
 use crate::outcome::Code;
 use pipeline::mesh::TriangleSoup;
 use pipeline::space::Vec3;
@@ -66,7 +66,7 @@ impl ObjError {
 }
 
 /// Reads an OBJ file.
-pub(super) fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
+pub(super) fn read(bytes: &[u8]) -> Result<Content, ReadError> {
     // Names and comments may be in any encoding; numbers are ASCII.
     let text = String::from_utf8_lossy(bytes);
     let statements = statements(&text);
@@ -75,6 +75,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
     let loaded = tobj::load_obj_buf(&mut plain.as_bytes(), &tobj::LoadOptions::default(), no_materials);
     let (models, _) = loaded.map_err(|e| ObjError::Library { problem: e.to_string() })?;
+    let mut notes = Notes::new("OBJ");
+    names(&text).for_each(|name| notes.name(name));
     let mut triangles = Vec::new();
     for mesh in models.iter().map(|m| &m.mesh) {
         geometry.agrees_with(&mesh.positions)?;
@@ -83,11 +85,20 @@ pub(super) fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
         for size in triangles_only.as_ref().unwrap_or(&mesh.face_arities) {
             let (face, others) = rest.split_at((*size as usize).min(rest.len()));
             let corners: Vec<u32> = face.iter().map(|i| geometry.first_used[*i as usize]).collect();
+            notes.polygons += usize::from(face.len() > 3);
             triangles.extend(polygon::triangulate(&corners, &geometry.points));
             rest = others;
         }
     }
-    Ok(TriangleSoup::new(geometry.points, triangles)?)
+    Ok(Content { soup: TriangleSoup::new(geometry.points, triangles)?, notes })
+}
+
+/// The names of objects and groups.
+fn names(text: &str) -> impl Iterator<Item = &str> {
+    let lines = text.split(['\n', '\r']).map(str::trim_start);
+    lines.filter_map(|line| {
+        line.split_once([' ', '\t']).filter(|(word, _)| ["o", "g"].contains(word)).map(|(_, name)| name)
+    })
 }
 
 /// The vertices of a file in its own order, and in the order in which faces first use them, which is the library's.
@@ -191,6 +202,10 @@ fn shown(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
+        super::read(bytes).map(|content| content.soup)
+    }
     use pipeline::mesh::SoupError;
 
     const SQUARE: &str = "# caf\u{e9}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";

@@ -5,7 +5,7 @@
 //! after any blanks, and text follows. ASCII files may hold several solids; all of them are read. Words count, not
 //! lines: a facet may stand on one line.
 
-use super::ReadError;
+use super::{Content, Notes, ReadError};
 use crate::outcome::Code;
 use pipeline::mesh::TriangleSoup;
 
@@ -108,18 +108,19 @@ impl StlError {
 }
 
 /// Reads an STL file.
-pub(super) fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
+pub(super) fn read(bytes: &[u8]) -> Result<Content, ReadError> {
     let declared = declared(bytes);
     let size_fits = declared.is_some_and(|n| needed(n) == bytes.len() as u64);
+    let mut notes = Notes::new(if size_fits { "STL, binary" } else { "STL, ASCII" });
     let points = if size_fits {
         binary(&bytes[HEADER..])?
     } else if begins_with_solid(bytes) {
-        ascii(bytes)?
+        ascii(bytes, &mut notes)?
     } else {
         return Err(mismatch(declared, bytes.len()).into());
     };
     let triangles = (0..points.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    Ok(TriangleSoup::new(points, triangles)?)
+    Ok(Content { soup: TriangleSoup::new(points, triangles)?, notes })
 }
 
 fn declared(bytes: &[u8]) -> Option<u32> {
@@ -225,7 +226,7 @@ fn is(word: &[u8], keyword: &str) -> bool {
 }
 
 /// The corners of all triangles of all solids.
-fn ascii(bytes: &[u8]) -> Result<Vec<[f64; 3]>, StlError> {
+fn ascii(bytes: &[u8], notes: &mut Notes) -> Result<Vec<[f64; 3]>, StlError> {
     let mut points: Vec<[f64; 3]> = Vec::new();
     let mut words = Words::new(text(bytes));
     words.line += bytes[..bytes.len() - text(bytes).len()].iter().filter(|b| **b == b'\n').count();
@@ -238,7 +239,9 @@ fn ascii(bytes: &[u8]) -> Result<Vec<[f64; 3]>, StlError> {
         match (word.to_ascii_lowercase().as_slice(), corners) {
             (b"solid", None) => {
                 in_solid = true;
+                let rest = words.rest;
                 words.name();
+                notes.name(&String::from_utf8_lossy(&rest[..rest.len() - words.rest.len()]));
             }
             (b"endsolid", None) => {
                 in_solid = false;
@@ -300,6 +303,10 @@ fn shown(word: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
+        super::read(bytes).map(|content| content.soup)
+    }
 
     fn facet(x: &str) -> String {
         format!("facet normal 0 0 1\nouter loop\nvertex {x} 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n")

@@ -3,6 +3,7 @@
 
 mod build;
 
+use crate::formats::Notes;
 use crate::outcome::{Reason, Status};
 use crate::settings::{self, Settings};
 pub use build::{certificate, chart_checksum, chart_report, repairs, seams, surface};
@@ -31,6 +32,8 @@ pub struct Report {
     pub status: Status,
     /// Why it was refused or failed.
     pub reason: Option<Reason>,
+    /// What the file holds beside its triangles; null where it was not read.
+    pub content: Option<Notes>,
     /// The surface, as far as it was read.
     pub surface: Option<Surface>,
     /// Components that were refused while others were certified.
@@ -390,6 +393,7 @@ impl Report {
             settings: settings.into(),
             status: Status::Failed,
             reason: None,
+            content: None,
             surface: None,
             refused_components: vec![],
             repairs: None,

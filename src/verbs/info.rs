@@ -41,7 +41,7 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
 
 fn answer(job: &Job, settings: &Settings) -> Answer {
     let input = job.path.to_string_lossy().into_owned();
-    let found = guard(|| repaired(&decode(&job.path, &read_file(&job.path)?)?, settings));
+    let found = guard(|| repaired(&decode(&job.path, &read_file(&job.path)?, settings)?.soup, settings));
     match found {
         Ok(found) => Answer {
             surface: Some(report::surface(&found)),

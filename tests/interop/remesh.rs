@@ -128,7 +128,7 @@ fn disk_with_flat_triangles() -> TriangleSoup {
 fn a_plate_of_genus_9_is_remeshed_from_two_halves() {
     let out = tempfile::tempdir().expect("a folder");
     let bytes = std::fs::read(fixture("plate_genus9.stl")).expect("a fixture");
-    let soup = planish::formats::read(planish::formats::Format::Stl, &bytes).expect("readable");
+    let soup = planish::formats::read_alone(planish::formats::Format::Stl, &bytes).expect("readable").soup;
     let (folder, report) = write_labelled(out.path(), &soup, &settings(None), |p| u32::from(p[2] > 0.0));
     assert_eq!((report.seams.curves, report.seams.corners, report.charts[0].loops), (10, 0, 10));
     assert!(report.hand_off.is_some_and(|h| h.warning.is_none()));

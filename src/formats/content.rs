@@ -1,0 +1,108 @@
+//! What readers are given, and what they give.
+
+use pipeline::mesh::TriangleSoup;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Names that are kept, at most.
+const NAMES: usize = 100;
+
+/// Characters of a name that are kept, at most.
+const NAME: usize = 200;
+
+/// What a reader is given: the bytes of a file, and what it may ask for. No reader touches the disk.
+#[derive(Clone, Copy)]
+pub struct Source<'a> {
+    /// The file.
+    pub bytes: &'a [u8],
+    /// What is too much.
+    pub limits: &'a Limits,
+    /// The files beside it.
+    pub beside: &'a dyn Beside,
+}
+
+/// Gives the bytes of a file that lies beside the one that is read.
+pub trait Beside {
+    /// The bytes of the file `name`, which is a plain name (no folder, no scheme), of at most `most` bytes.
+    ///
+    /// # Errors
+    /// Why there are none, for people.
+    fn read(&self, name: &str, most: u64) -> Result<Vec<u8>, String>;
+}
+
+/// Nothing lies beside the file.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Nothing;
+
+impl Beside for Nothing {
+    fn read(&self, name: &str, _most: u64) -> Result<Vec<u8>, String> {
+        Err(format!("there is no file {name} beside it"))
+    }
+}
+
+/// What is too much for one input. Files may come from anyone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of the file, and of all that it takes along.
+    pub file: u64,
+    /// Points, and triangles.
+    pub elements: u64,
+    /// Bytes that compressed data may become, all together, per byte of the file.
+    pub expansion: u64,
+    /// Levels of nested nodes, groups, elements.
+    pub depth: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { file: 16 << 30, elements: TriangleSoup::MAX_TRIANGLES as u64, expansion: 1000, depth: 64 }
+    }
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Content {
+    /// Its triangles.
+    pub soup: TriangleSoup,
+    /// What else there is to tell.
+    pub notes: Notes,
+}
+
+/// What a file holds beside its triangles, for the report.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Notes {
+    /// Format, version and encoding, as `PLY, binary, big-endian`.
+    pub format: String,
+    /// The unit of length, where the file tells one.
+    pub units: Option<String>,
+    /// Names of solids, objects, groups, in the order of the file; the first 100 of them.
+    pub names: Vec<String>,
+    /// Faces with more than three corners, which were cut into triangles.
+    pub polygons: usize,
+    /// Nodes in the middle of edges, which were left out: edges are taken to be straight.
+    pub mid_nodes: usize,
+    /// What is no surface and was left out: how many elements of each kind.
+    pub skipped: BTreeMap<String, usize>,
+}
+
+impl Notes {
+    /// Nothing but the format.
+    pub fn new(format: impl Into<String>) -> Self {
+        Self { format: format.into(), ..Self::default() }
+    }
+
+    /// Adds a name, if it is one and new.
+    pub fn name(&mut self, name: &str) {
+        let name: String = name.trim().chars().take(NAME).collect();
+        if !name.is_empty() && self.names.len() < NAMES && !self.names.contains(&name) {
+            self.names.push(name);
+        }
+    }
+
+    /// Counts elements that are left out.
+    pub fn skip(&mut self, kind: &str, count: usize) {
+        if count > 0 {
+            *self.skipped.entry(kind.to_owned()).or_insert(0) += count;
+        }
+    }
+}
