@@ -41,7 +41,9 @@ pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publishe
         }
     }
     let all_succeeded = hooks.is_empty() || hooks::account(&target).is_some_and(|a| a.failure().is_none());
-    if all_succeeded && report.refused_components.is_empty() {
+    // With files beside it, an input would lose its sense elsewhere; and they may belong to others, too.
+    let is_alone = report.input.beside.is_empty();
+    if all_succeeded && is_alone && report.refused_components.is_empty() {
         done_with(job, settings)?;
     }
     Ok(true)

@@ -225,32 +225,47 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
     }
     let Shared { settings, publisher, .. } = &*travel.shared;
     let mut report = Report::new(input(&travel.job, content.as_deref().ok()), settings);
+    let folder = stages::Folder::of(&travel.job.path);
     let decoded = travel.compute(Stage::Read, |_| {
         let bytes = content?;
         report.input.blake3 = Some(blake3::hash(&bytes).to_hex().to_string());
-        let older =
-            if settings.force { None } else { ledger::up_to_date(&publisher.target(&travel.job.name), &report) };
+        let older = if settings.force {
+            None
+        } else {
+            ledger::up_to_date(&publisher.target(&travel.job.name), &report, &travel.job.path)
+        };
         Ok(match older {
             Some(older) => Err(older),
-            None => Ok(stages::decode(&travel.job.path, &bytes, settings)?),
+            None => Ok(stages::decode(&travel.job.path, &bytes, settings, &folder)?),
         })
     });
+    travel.job.set_beside(folder.asked());
+    report.input.beside = folder.read();
     match decoded {
         Ok(Ok(Content { soup, notes })) => {
             report.content = Some(notes);
             hand_on(soups, Soup { travel, report, soup });
         }
         Ok(Err(older)) => {
+            travel.job.set_beside(older.input.beside.iter().map(|o| o.file.clone()).collect());
             let _in_stage = travel.in_stage(Stage::Read);
             tracing::info!(status = %older.status, "is up to date");
             published(travel.clone(), Done { report: older, up_to_date: true }, chain);
+        }
+        Err(Stopped::For(reason)) if reason.code == Code::MissingFile && travel.job.look.is_some() => {
+            travel.end(End::Waiting(reason));
         }
         Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
     }
 }
 
 fn input(job: &Job, content: Option<&[u8]>) -> Input {
-    Input { name: job.name.to_string_lossy().into_owned(), bytes: content.map(|c| c.len() as u64), blake3: None }
+    Input {
+        name: job.name.to_string_lossy().into_owned(),
+        bytes: content.map(|c| c.len() as u64),
+        blake3: None,
+        beside: vec![],
+    }
 }
 
 fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {

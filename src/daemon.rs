@@ -155,8 +155,14 @@ impl<'a> Daemon<'a> {
         if self.jobs.get(&job.name).is_some_and(|current| Arc::ptr_eq(current, &job)) {
             self.jobs.remove(&job.name);
             let look = job.look.unwrap_or_else(|| unreachable!("jobs of an inbox have one"));
+            self.eyes.look_beside(&job.name, job.beside());
             match end {
                 End::Done(_) => self.inbox.done(&job.name, &look),
+                // What it waits for is part of what is seen of it now.
+                End::Waiting(reason) => {
+                    tracing::info!(input = %job.name.display(), "waits: {}", reason.message);
+                    self.inbox.done(&job.name, &look);
+                }
                 End::Changed => self.inbox.again(&job.name, &look, Instant::now() + Duration::from_secs(1)),
                 End::Unwanted | End::Unwritten(_) | End::Unchained(..) | End::Lost => {
                     self.inbox.again(&job.name, &look, Instant::now() + AGAIN);

@@ -14,7 +14,16 @@ use std::time::{Duration, Instant};
 pub const SETTLE: Duration = Duration::from_millis(1000);
 
 /// What a look at the folder shows: relative paths of all files that may hold a mesh.
-pub type Listing = BTreeMap<PathBuf, Look>;
+pub type Listing = BTreeMap<PathBuf, Seen>;
+
+/// What is seen of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Seen {
+    /// The file itself.
+    pub look: Look,
+    /// The files beside it that it is known to ask for; none where one is missing.
+    pub beside: Vec<Option<Look>>,
+}
 
 /// What is to be done.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,7 +42,7 @@ pub struct Inbox {
 
 #[derive(Debug)]
 struct File {
-    look: Look,
+    seen: Seen,
     state: State,
 }
 
@@ -58,18 +67,19 @@ impl Inbox {
             }
             there
         });
-        for (name, look) in listing {
-            let file = self.files.entry(name.clone()).or_insert(File { look: *look, state: State::Changing(now) });
-            if file.look != *look {
+        for (name, seen) in listing {
+            let changing = || File { seen: seen.clone(), state: State::Changing(now) };
+            let file = self.files.entry(name.clone()).or_insert_with(changing);
+            if file.seen != *seen {
                 if file.state == State::Submitted {
                     changes.push(Change::Withdrawn(name.clone()));
                 }
-                *file = File { look: *look, state: State::Changing(now) };
+                *file = changing();
             } else if let State::Changing(since) = file.state
                 && now.saturating_duration_since(since) >= SETTLE
             {
                 file.state = State::Submitted;
-                changes.push(Change::Settled(name.clone(), *look));
+                changes.push(Change::Settled(name.clone(), seen.look));
             }
         }
         changes
@@ -90,7 +100,7 @@ impl Inbox {
     }
 
     fn submitted(&mut self, name: &Path, look: &Look) -> Option<&mut File> {
-        self.files.get_mut(name).filter(|file| file.look == *look && file.state == State::Submitted)
+        self.files.get_mut(name).filter(|file| file.seen.look == *look && file.state == State::Submitted)
     }
 
     /// When the next file may have settled.
@@ -115,7 +125,8 @@ mod tests {
         let look = |(name, size): &(&str, usize)| {
             let path = folder.path().join(name);
             std::fs::write(&path, vec![b'x'; *size]).expect("written");
-            (PathBuf::from(name), Look::at(&path).expect("there").expect("a file"))
+            let look = Look::at(&path).expect("there").expect("a file");
+            (PathBuf::from(name), Seen { look, beside: vec![] })
         };
         files.iter().map(look).collect()
     }
@@ -137,7 +148,7 @@ mod tests {
         assert_eq!(inbox.due(), Some(start + SETTLE));
         assert_eq!(settled(&inbox.look(&files, start + SETTLE)), ["a.stl", "b.stl"]);
         assert!(inbox.look(&files, start + 2 * SETTLE).is_empty());
-        let a = files[Path::new("a.stl")];
+        let a = files[Path::new("a.stl")].look;
         inbox.done(Path::new("a.stl"), &a);
         assert!(inbox.look(&files, start + 9 * SETTLE).is_empty());
         assert_eq!(inbox.due(), None);
@@ -161,7 +172,7 @@ mod tests {
         let withdrawn = [Change::Withdrawn("a.stl".into())];
         assert_eq!(inbox.look(&new, start + 2 * SETTLE), withdrawn);
         // The end of the withdrawn job says nothing about the newer content.
-        inbox.done(Path::new("a.stl"), &old[Path::new("a.stl")]);
+        inbox.done(Path::new("a.stl"), &old[Path::new("a.stl")].look);
         assert_eq!(settled(&inbox.look(&new, start + 3 * SETTLE)), ["a.stl"]);
         assert_eq!(inbox.look(&Listing::new(), start + 4 * SETTLE), withdrawn);
         assert_eq!(inbox.unsettled(), 0);
@@ -175,7 +186,7 @@ mod tests {
         let files = listing(&[("a.stl", 1)]);
         inbox.look(&files, start);
         inbox.look(&files, start + SETTLE);
-        inbox.again(Path::new("a.stl"), &files[Path::new("a.stl")], start + 5 * SETTLE);
+        inbox.again(Path::new("a.stl"), &files[Path::new("a.stl")].look, start + 5 * SETTLE);
         assert!(inbox.look(&files, start + 4 * SETTLE).is_empty());
         assert_eq!(settled(&inbox.look(&files, start + 5 * SETTLE)), ["a.stl"]);
     }

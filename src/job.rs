@@ -4,6 +4,7 @@ use crate::look::Look;
 use crate::outcome::Reason;
 use crate::publish::PublishError;
 use crate::report::Report;
+use parking_lot::Mutex;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -19,6 +20,7 @@ pub struct Job {
     /// What the file must look like, where it may change at any moment.
     pub look: Option<Look>,
     unwanted: AtomicBool,
+    beside: Mutex<Vec<String>>,
 }
 
 /// The stages, as progress is told.
@@ -76,6 +78,8 @@ pub enum End {
     Unwanted,
     /// The file is not what was seen, or gone: nothing was published.
     Changed,
+    /// The file names another one that is not there, or not yet as long as it says: nothing was published.
+    Waiting(Reason),
     /// The result could not be written.
     Unwritten(PublishError),
     /// A stage broke down outside the work on this job: a fault of planish. Nothing was published.
@@ -96,7 +100,7 @@ pub struct Done {
 impl Job {
     /// The job for a file whose result goes to `name`.
     pub fn new(path: PathBuf, name: PathBuf, bytes: u64) -> Self {
-        Self { path, name, bytes, look: None, unwanted: AtomicBool::new(false) }
+        Self { path, name, bytes, look: None, unwanted: AtomicBool::new(false), beside: Mutex::default() }
     }
 
     /// The job for a file that is named: its result has its name.
@@ -119,6 +123,16 @@ impl Job {
     /// Whether the result is still wanted.
     pub fn is_wanted(&self) -> bool {
         !self.unwanted.load(Ordering::Relaxed)
+    }
+
+    /// The names of the files beside it that it asked for when it was read.
+    pub fn beside(&self) -> Vec<String> {
+        self.beside.lock().clone()
+    }
+
+    /// Tells which files beside it it asked for.
+    pub fn set_beside(&self, names: Vec<String>) {
+        *self.beside.lock() = names;
     }
 
     /// Whether the file still is what was seen; always, where nothing was.

@@ -1,20 +1,24 @@
 //! The ledger: which inputs are done. There is no other one than the published reports.
 
 use crate::outcome::{Reason, Status};
-use crate::report::{self, Output, Report};
-use crate::stages::read_file;
+use crate::report::{self, Input, Output, Report};
+use crate::stages::{beside, read_file};
 use serde::Deserialize;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use walkdir::{DirEntry, WalkDir};
 
-/// The report published in `folder`, if it is that of the same content, settings and version as `fresh`, and its files
-/// are there, unharmed. A failure is none: another version may do better, or another day.
-pub fn up_to_date(folder: &Path, fresh: &Report) -> Option<Report> {
+/// The report published in `folder`, if it is that of the same content, settings and version as `fresh`, of the file at
+/// `path` and those beside it, and its files are there, unharmed. A failure is none: another version may do better, or
+/// another day.
+pub fn up_to_date(folder: &Path, fresh: &Report, path: &Path) -> Option<Report> {
     let older: Report = serde_json::from_slice(&read_file(&folder.join(report::FILE)).ok()?).ok()?;
-    let same = older.input == fresh.input
+    // The same content names the same files beside it.
+    let beside = |o: &Output| beside(path, &o.file, o.bytes).is_ok_and(|content| Output::of(&o.file, &content) == *o);
+    let same = Input { beside: vec![], ..older.input.clone() } == fresh.input
         && fresh.input.blake3.is_some()
+        && older.input.beside.iter().all(beside)
         && older.settings == fresh.settings
         && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
         && older.status != Status::Failed;

@@ -44,6 +44,10 @@ pub enum Code {
     CountMismatch,
     /// A coordinate is not a number, infinite, or above 1e100.
     NotFinite,
+    /// The file names another one that is not there.
+    MissingFile,
+    /// The file names another one that planish does not open.
+    ForeignFile,
     /// There is no triangle.
     NoTriangles,
     /// Every triangle has two equal vertices.

@@ -16,6 +16,7 @@ use pipeline::seams::SeamNetwork;
 use pipeline::{
     CertifiedChart, MapError, MappedChart, SplitError, finish_or_split, linear, map_or_split, repair, sparse,
 };
+use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -43,15 +44,15 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, Reason> {
     std::fs::read(path).map_err(|e| unreadable(e.to_string()))
 }
 
-/// Decodes the bytes of the file at `path` by its extension.
+/// Decodes the bytes of the file at `path` by its extension; others may lie beside it in `folder`.
 ///
 /// # Errors
 /// The refusal, with the place and what to do.
-pub fn decode(path: &Path, bytes: &[u8], settings: &Settings) -> Result<Content, Reason> {
+pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -> Result<Content, Reason> {
     let refuse = |code, message: String| Err(Reason { code, message, place: Some("file name".to_owned()) });
     match formats::kind(path) {
         Kind::Mesh(format) => {
-            let source = Source { bytes, limits: &settings.limits, beside: &Folder(path) };
+            let source = Source { bytes, limits: &settings.limits, beside: folder };
             formats::read(format, &source).map_err(|e| e.reason())
         }
         Kind::OtherMesh(e) => refuse(
@@ -72,21 +73,55 @@ pub fn decode(path: &Path, bytes: &[u8], settings: &Settings) -> Result<Content,
     }
 }
 
-/// The folder of the file at this path.
-struct Folder<'a>(&'a Path);
+/// The folder of a file, and what was asked for in it.
+pub struct Folder<'a> {
+    of: &'a Path,
+    asked: RefCell<Vec<(String, Option<Output>)>>,
+}
+
+impl<'a> Folder<'a> {
+    /// The folder of the file at this path.
+    pub fn of(path: &'a Path) -> Self {
+        Self { of: path, asked: RefCell::default() }
+    }
+
+    /// The names of the files that were asked for, there or not.
+    pub fn asked(&self) -> Vec<String> {
+        self.asked.borrow().iter().map(|(name, _)| name.clone()).collect()
+    }
+
+    /// The files that were read.
+    pub fn read(&self) -> Vec<Output> {
+        self.asked.borrow().iter().filter_map(|(_, read)| read.clone()).collect()
+    }
+}
 
 impl Beside for Folder<'_> {
     fn read(&self, name: &str, most: u64) -> Result<Vec<u8>, String> {
-        let path = self.0.with_file_name(name);
-        let metadata = std::fs::symlink_metadata(&path).map_err(|e| format!("{name}: {e}"))?;
-        if !metadata.is_file() {
-            return Err(format!("{name} is no regular file"));
-        }
-        if metadata.len() > most {
-            return Err(format!("{name} has {} bytes, more than {most}", metadata.len()));
-        }
-        std::fs::read(&path).map_err(|e| format!("{name}: {e}"))
+        let bytes = beside(self.of, name, most);
+        let read = bytes.as_ref().ok().map(|bytes| Output::of(name, bytes));
+        self.asked.borrow_mut().push((name.to_owned(), read));
+        bytes
     }
+}
+
+/// The bytes of the file `name`, which lies beside the one at `path`: a regular file, no link, of at most `most` bytes.
+///
+/// # Errors
+/// Why there are none, for people.
+pub fn beside(path: &Path, name: &str, most: u64) -> Result<Vec<u8>, String> {
+    let path = path.with_file_name(name);
+    if path.file_name() != Some(name.as_ref()) {
+        return Err(format!("{name} is no plain name"));
+    }
+    let metadata = std::fs::symlink_metadata(&path).map_err(|e| format!("{name}: {e}"))?;
+    if !metadata.is_file() {
+        return Err(format!("{name} is no regular file"));
+    }
+    if metadata.len() > most {
+        return Err(format!("{name} has {} bytes, more than {most}", metadata.len()));
+    }
+    std::fs::read(&path).map_err(|e| format!("{name}: {e}"))
 }
 
 /// Repairs a soup as the settings say.

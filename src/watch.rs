@@ -10,12 +10,12 @@
 
 use crate::conveyor::{Conveyor, Ended};
 use crate::formats::{self, Kind};
-use crate::inbox::Listing;
+use crate::inbox::{Listing, Seen};
 use crate::look::{Identity, Look};
 use crossbeam_channel::{Receiver, Sender, after, bounded, select};
 use notify::event::{AccessKind, AccessMode, EventKind};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -80,6 +80,8 @@ pub struct Eyes {
     watched: Option<Identity>,
     is_missing: bool,
     passed_over: BTreeSet<PathBuf>,
+    /// Files that ask for others beside them, with the names of these.
+    beside: BTreeMap<PathBuf, Vec<String>>,
     rested: Instant,
 }
 
@@ -96,6 +98,7 @@ impl Eyes {
             watched: None,
             is_missing: false,
             passed_over: BTreeSet::new(),
+            beside: BTreeMap::new(),
             rested: Instant::now(),
         }
     }
@@ -103,6 +106,15 @@ impl Eyes {
     /// The folder.
     pub fn inbox(&self) -> &Path {
         &self.inbox
+    }
+
+    /// From now on these files beside the file `name` are part of what is seen of it.
+    pub fn look_beside(&mut self, name: &Path, beside: Vec<String>) {
+        if beside.is_empty() {
+            self.beside.remove(name);
+        } else {
+            self.beside.insert(name.to_owned(), beside);
+        }
     }
 
     /// How often to look even though nothing is heard.
@@ -198,7 +210,7 @@ impl Eyes {
     }
 
     /// A file that may hold a mesh, by its path below the inbox.
-    fn see(&mut self, entry: &DirEntry) -> Option<(PathBuf, Look)> {
+    fn see(&mut self, entry: &DirEntry) -> Option<(PathBuf, Seen)> {
         let name = entry.path().strip_prefix(&self.inbox).ok()?;
         if !matches!(formats::kind(name), Kind::Mesh(_) | Kind::OtherMesh(_)) {
             return None;
@@ -214,7 +226,9 @@ impl Eyes {
             }
             return None;
         };
-        Some((name.to_owned(), look))
+        let asked = self.beside.get(name).into_iter().flatten();
+        let beside = asked.map(|file| Look::at(&entry.path().with_file_name(file)).ok().flatten());
+        Some((name.to_owned(), Seen { look, beside: beside.collect() }))
     }
 
     /// Whether a symbolic link leads to something in the inbox. Others are not followed: whoever may drop files must not

@@ -88,7 +88,7 @@ mod tests {
         let places = [(2, 0), (0, 1), (1, 0)];
         for turn in 0..3 {
             let mesh = repair(&shapes::disk(2), &Default::default()).expect("a surface").mesh;
-            let input = Input { name: "a.stl".to_owned(), bytes: None, blake3: None };
+            let input = Input { name: "a.stl".to_owned(), bytes: None, blake3: None, beside: vec![] };
             let surface = Surface::new(begin(&shared), mesh, 3, Report::new(input, &shared.settings));
             surface.expect(1);
             let mut order = places;

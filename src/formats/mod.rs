@@ -1,6 +1,7 @@
 //! File formats: which there are, and reading a soup of triangles from the bytes of a file.
 
 mod content;
+mod gltf;
 pub mod gmsh;
 mod obj;
 mod polygon;
@@ -21,6 +22,8 @@ pub enum Format {
     Stl,
     /// Wavefront OBJ.
     Obj,
+    /// glTF 2.0, JSON or binary container.
+    Gltf,
 }
 
 /// What the name of a file says about it.
@@ -37,7 +40,7 @@ pub enum Kind {
 }
 
 /// Extensions of meshes in formats that this version does not read.
-const OTHER_MESHES: [&str; 8] = ["ply", "gltf", "glb", "vtk", "vtu", "vtp", "msh", "off"];
+const OTHER_MESHES: [&str; 6] = ["ply", "vtk", "vtu", "vtp", "msh", "off"];
 
 /// Extensions of what lies beside meshes.
 const NO_MESHES: [&str; 13] =
@@ -51,6 +54,7 @@ pub fn kind(path: &Path) -> Kind {
         _ if name.starts_with('.') || name.ends_with('~') => Kind::NoMesh,
         "stl" => Kind::Mesh(Format::Stl),
         "obj" => Kind::Mesh(Format::Obj),
+        "gltf" | "glb" => Kind::Mesh(Format::Gltf),
         e if OTHER_MESHES.contains(&e) => Kind::OtherMesh(extension),
         e if NO_MESHES.contains(&e) => Kind::NoMesh,
         _ => Kind::Unknown(extension),
@@ -69,6 +73,9 @@ pub enum ReadError {
     /// Not an OBJ file.
     #[error(transparent)]
     Obj(#[from] obj::ObjError),
+    /// Not a glTF file.
+    #[error(transparent)]
+    Gltf(#[from] gltf::GltfError),
     /// What was read makes no sense.
     #[error(transparent)]
     Soup(#[from] SoupError),
@@ -81,6 +88,7 @@ impl ReadError {
             Self::Empty => (Code::EmptyFile, Some("byte 0".to_owned())),
             Self::Stl(e) => (e.code(), e.place()),
             Self::Obj(e) => (e.code(), e.place()),
+            Self::Gltf(e) => (e.code(), e.place()),
             Self::Soup(e) => soup_reason(e),
         };
         Reason { code, message: self.to_string(), place }
@@ -108,6 +116,7 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
     match format {
         Format::Stl => stl::read(bytes),
         Format::Obj => obj::read(bytes),
+        Format::Gltf => gltf::read(source),
     }
 }
 

@@ -63,6 +63,9 @@ pub struct Input {
     pub bytes: Option<u64>,
     /// The hash of its content.
     pub blake3: Option<String>,
+    /// The files beside it that were read, too.
+    #[serde(default)]
+    pub beside: Vec<Output>,
 }
 
 /// The settings that decide the result.

@@ -108,7 +108,7 @@ fn table(rows: &[Row]) -> Table {
         table.add_row(match end {
             End::Done(done) | End::Unchained(done, _) => cells(name, done),
             End::Unwanted => vec![name, "interrupted".to_owned()],
-            End::Changed | End::Unwritten(_) | End::Lost => vec![name, "not written".to_owned()],
+            End::Changed | End::Waiting(_) | End::Unwritten(_) | End::Lost => vec![name, "not written".to_owned()],
         });
     }
     table
@@ -143,6 +143,7 @@ fn tell_trouble(job: &Job, end: &End) {
         End::Unwritten(error) => eprintln!("planish: {input}: {error}"),
         End::Unchained(_, error) => eprintln!("planish: {input}: certified, but {error}"),
         End::Changed => eprintln!("planish: {input}: it changed while it was read; try again"),
+        End::Waiting(reason) => eprintln!("planish: {input}: {}", reason.message),
         End::Lost => eprintln!("planish: {input}: planish broke down; that is a fault of planish: please report it"),
         End::Done(Done { report: Report { reason: Some(reason), status, .. }, .. }) => {
             let place = reason.place.as_ref().map_or(String::new(), |p| format!(" ({p})"));

@@ -166,3 +166,51 @@ fn the_status_tells_what_is_done_and_what_runs() {
     let text = status(false);
     assert!(text.code == Some(1) && text.out.contains("was killed while it did this"), "{}", text.out);
 }
+
+/// A document and its data: a disk in glTF.
+fn gltf(n: u32, twist: f64) -> (String, Vec<u8>) {
+    let soup = pipeline::shapes::disk(n);
+    let coordinates = soup.points().iter().flatten().map(|x| (x * (1.0 + 1e-3 * twist)) as f32);
+    let mut data: Vec<u8> = coordinates.flat_map(f32::to_le_bytes).collect();
+    let (points, corners) = (soup.points().len(), 3 * soup.triangles().len());
+    data.extend(soup.triangles().iter().flatten().flat_map(|i| i.to_le_bytes()));
+    let document = serde_json::json!({
+        "asset": {"version": "2.0"},
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": points, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5125, "count": corners, "type": "SCALAR"}
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 12 * points},
+            {"buffer": 0, "byteOffset": 12 * points, "byteLength": 4 * corners}
+        ],
+        "buffers": [{"byteLength": data.len(), "uri": "a%20disk.bin"}]
+    });
+    (document.to_string(), data)
+}
+
+#[test]
+fn a_document_waits_for_the_data_that_it_names_and_follows_their_changes() {
+    let mut w = Watched::new(&["--inputs", "delete"]);
+    w.start();
+    let (document, data) = gltf(6, 0.0);
+    w.drop_in("a.gltf", document.as_bytes());
+    w.wait_until("it waits", |w| w.log().contains("waits: "));
+    assert!(!w.out.of("a.gltf").exists());
+    write_slowly(&w.inbox().join("a disk.bin"), &data, 8, Duration::from_millis(200));
+    w.wait_for(&[("a.gltf", document.as_bytes())]);
+    w.assert_complete("a.gltf", Status::Certified);
+    let beside = |w: &Watched| w.out.report("a.gltf").input.beside[0].blake3.clone();
+    assert_eq!(beside(&w), blake3::hash(&data).to_hex().as_str());
+    let (_, newer) = gltf(6, 1.0);
+    w.drop_in("a disk.bin", &newer);
+    w.wait_until("newer data are processed", |w| beside(w) == blake3::hash(&newer).to_hex().as_str());
+    w.assert_complete("a.gltf", Status::Certified);
+    w.stop();
+    assert!(w.inbox().join("a.gltf").exists() && w.inbox().join("a disk.bin").exists(), "both stay, together");
+    w.start();
+    w.wait_until("it is up to date", |w| w.logged("a.gltf", "is up to date") > 0);
+    w.stop();
+    w.assert_tidy(&["a.gltf"]);
+}

@@ -1,0 +1,173 @@
+//! Accessors: how vectors and indices lie in the data.
+
+use super::buffers::Buffers;
+use super::{GltfError, broken};
+use gltf::json::accessor::{ComponentType, Type, sparse};
+use gltf::json::validation::Checked;
+use gltf::json::{Accessor, Index, Root, buffer};
+
+/// Reads accessors of one document.
+pub(super) struct Accessors<'a> {
+    pub root: &'a Root,
+    pub buffers: &'a Buffers<'a>,
+    /// Elements of one accessor, at most.
+    pub most: u64,
+}
+
+/// How elements lie in a view.
+struct Layout<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    count: usize,
+}
+
+impl<'a> Layout<'a> {
+    /// Checks that `count` elements of `size` bytes are there.
+    fn new(view: (&'a [u8], Option<usize>), offset: u64, count: usize, size: usize) -> Result<Self, String> {
+        let (bytes, stride) = (view.0, view.1.unwrap_or(size));
+        if stride < size {
+            return Err(format!("a stride of {stride} bytes for elements of {size}"));
+        }
+        let rest = usize::try_from(offset).ok().and_then(|o| bytes.get(o..));
+        let rest = rest.ok_or_else(|| format!("byte {offset} of {}", bytes.len()))?;
+        let needed = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
+        match needed {
+            Some(needed) if needed <= rest.len() => Ok(Self { bytes: rest, stride, count }),
+            _ => Err(format!("{count} elements, {stride} bytes apart, in {} bytes", rest.len())),
+        }
+    }
+
+    fn elements(&self) -> impl Iterator<Item = &'a [u8]> {
+        (0..self.count).map(|i| &self.bytes[i * self.stride..])
+    }
+}
+
+impl Accessors<'_> {
+    /// The vectors of an accessor.
+    pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f64; 3]>, GltfError> {
+        let (accessor, count) = self.get(index)?;
+        let fail = |problem: String| broken(place(index), problem);
+        let kind = component(&accessor.component_type).ok_or_else(|| fail("an unknown component type".to_owned()))?;
+        if accessor.type_ != Checked::Valid(Type::Vec3) {
+            return Err(fail("positions must be VEC3".to_owned()));
+        }
+        let decode = decoder(kind, accessor.normalized).ok_or_else(|| fail("positions cannot be U32".to_owned()))?;
+        let vector = |bytes: &[u8]| [0, 1, 2].map(|k| decode(&bytes[k * kind.size()..]));
+        let read = |view: Index<buffer::View>, offset: u64, count: usize| {
+            let layout = Layout::new(self.buffers.view(view)?, offset, count, 3 * kind.size()).map_err(fail)?;
+            Ok::<_, GltfError>(layout.elements().map(vector).collect::<Vec<[f64; 3]>>())
+        };
+        let mut vectors = match accessor.buffer_view {
+            Some(view) => read(view, accessor.byte_offset.map_or(0, |o| o.0), count)?,
+            None if accessor.sparse.is_none() => return Err(self.without_data(index)),
+            None => vec![[0.0; 3]; count],
+        };
+        if let Some(sparse) = &accessor.sparse {
+            let places = self.sparse_places(sparse, count).map_err(|e| e.at(index))?;
+            let values = read(sparse.values.buffer_view, sparse.values.byte_offset.0, places.len())?;
+            places.into_iter().zip(values).for_each(|(i, value)| vectors[i] = value);
+        }
+        Ok(vectors)
+    }
+
+    /// The indices of an accessor.
+    pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, GltfError> {
+        let (accessor, count) = self.get(index)?;
+        let fail = |problem: String| broken(place(index), problem);
+        let kind = component(&accessor.component_type).and_then(|kind| index_decoder(kind).map(|d| (kind.size(), d)));
+        let (size, decode) = kind.ok_or_else(|| fail("indices must be U8, U16 or U32".to_owned()))?;
+        if accessor.type_ != Checked::Valid(Type::Scalar) || accessor.sparse.is_some() {
+            return Err(fail("indices must be plain scalars".to_owned()));
+        }
+        let view = accessor.buffer_view.ok_or_else(|| self.without_data(index))?;
+        let offset = accessor.byte_offset.map_or(0, |o| o.0);
+        let layout = Layout::new(self.buffers.view(view)?, offset, count, size).map_err(fail)?;
+        Ok(layout.elements().map(decode).collect())
+    }
+
+    /// An accessor and its number of elements.
+    fn get(&self, index: Index<Accessor>) -> Result<(&Accessor, usize), GltfError> {
+        let fail = |problem: &str| broken(place(index), problem);
+        let accessor = self.root.accessors.get(index.value()).ok_or_else(|| fail("there is none"))?;
+        let count = accessor.count.0;
+        if count > self.most {
+            let problem = format!("{count} elements, more than {}", self.most);
+            return Err(GltfError::TooMuch { place: place(index), problem });
+        }
+        Ok((accessor, usize::try_from(count).map_err(|_| fail("too many elements"))?))
+    }
+
+    /// Without data of its own, an accessor's may be compressed: that has a name.
+    fn without_data(&self, index: Index<Accessor>) -> GltfError {
+        let used = self.root.extensions_used.iter().find(|name| name.contains("compression"));
+        used.map_or_else(|| broken(place(index), "no data"), |name| GltfError::Extension(super::shown(name)))
+    }
+
+    /// The places whose values a sparse accessor gives.
+    fn sparse_places(&self, sparse: &sparse::Sparse, count: usize) -> Result<Vec<usize>, Sparse> {
+        let given = usize::try_from(sparse.count.0).ok().filter(|n| *n <= count);
+        let given = given.ok_or_else(|| Sparse::Broken("more sparse values than elements".to_owned()))?;
+        let kind = match sparse.indices.component_type {
+            Checked::Valid(kind) => index_decoder(kind.0).map(|d| (kind.0.size(), d)),
+            Checked::Invalid => None,
+        };
+        let (size, decode) = kind.ok_or_else(|| Sparse::Broken("an unknown type of sparse indices".to_owned()))?;
+        let view = self.buffers.view(sparse.indices.buffer_view).map_err(Sparse::View)?;
+        let layout = Layout::new(view, sparse.indices.byte_offset.0, given, size).map_err(Sparse::Broken)?;
+        let places: Vec<usize> = layout.elements().map(|b| decode(b) as usize).collect();
+        match places.iter().find(|p| **p >= count) {
+            Some(place) => Err(Sparse::Broken(format!("sparse value {place} of {count}"))),
+            None => Ok(places),
+        }
+    }
+}
+
+/// What is wrong with a sparse accessor.
+enum Sparse {
+    Broken(String),
+    View(GltfError),
+}
+
+impl Sparse {
+    fn at(self, index: Index<Accessor>) -> GltfError {
+        match self {
+            Self::Broken(problem) => broken(place(index), problem),
+            Self::View(error) => error,
+        }
+    }
+}
+
+fn place(index: Index<Accessor>) -> String {
+    format!("accessors[{}]", index.value())
+}
+
+fn component(kind: &Checked<gltf::json::accessor::GenericComponentType>) -> Option<ComponentType> {
+    if let Checked::Valid(kind) = kind { Some(kind.0) } else { None }
+}
+
+type Decode<T> = fn(&[u8]) -> T;
+
+/// How a coordinate is told. Small integers that are normalised stand for numbers up to one (glTF 2.0, 3.11).
+fn decoder(kind: ComponentType, normalized: bool) -> Option<Decode<f64>> {
+    Some(match (kind, normalized) {
+        (ComponentType::F32, _) => |b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+        (ComponentType::I8, false) => |b| f64::from(b[0] as i8),
+        (ComponentType::U8, false) => |b| f64::from(b[0]),
+        (ComponentType::I16, false) => |b| f64::from(i16::from_le_bytes([b[0], b[1]])),
+        (ComponentType::U16, false) => |b| f64::from(u16::from_le_bytes([b[0], b[1]])),
+        (ComponentType::I8, true) => |b| (f64::from(b[0] as i8) / 127.0).max(-1.0),
+        (ComponentType::U8, true) => |b| f64::from(b[0]) / 255.0,
+        (ComponentType::I16, true) => |b| (f64::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).max(-1.0),
+        (ComponentType::U16, true) => |b| f64::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0,
+        (ComponentType::U32, _) => return None,
+    })
+}
+
+fn index_decoder(kind: ComponentType) -> Option<Decode<u32>> {
+    Some(match kind {
+        ComponentType::U8 => |b| u32::from(b[0]),
+        ComponentType::U16 => |b| u32::from(u16::from_le_bytes([b[0], b[1]])),
+        ComponentType::U32 => |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]),
+        ComponentType::I8 | ComponentType::I16 | ComponentType::F32 => return None,
+    })
+}

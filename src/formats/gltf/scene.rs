@@ -1,0 +1,193 @@
+//! The scene: which meshes stand where.
+
+use super::accessor::Accessors;
+use super::buffers::Buffers;
+use super::{GltfError, Source, broken};
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Node, Root};
+use std::collections::BTreeMap;
+
+/// A point of glTF takes at least this many bytes in memory here.
+const POINT: u64 = 24;
+
+/// Files smaller than this are taken to be this large where memory is compared with size.
+const LEAST: u64 = 1 << 20;
+
+/// All triangles of a scene.
+#[derive(Default)]
+pub(super) struct Scene {
+    pub points: Vec<[f64; 3]>,
+    pub triangles: Vec<[u32; 3]>,
+    pub names: Vec<String>,
+    pub skipped: BTreeMap<&'static str, usize>,
+}
+
+/// An affine map: three columns and the place of the origin.
+#[derive(Clone, Copy)]
+struct Transform([[f64; 3]; 4]);
+
+/// What is needed on the way through the nodes.
+struct Walk<'a> {
+    root: &'a Root,
+    accessors: Accessors<'a>,
+    most: u64,
+    scene: Scene,
+}
+
+impl Scene {
+    /// Reads the default scene; without scenes, all nodes that are nobody's children; without nodes, all meshes.
+    pub fn read(root: &Root, buffers: &Buffers, source: &Source) -> Result<Self, GltfError> {
+        let size = LEAST.max(source.bytes.len() as u64);
+        let most = source.limits.elements.min(size.saturating_mul(source.limits.expansion) / POINT);
+        let accessors = Accessors { root, buffers, most };
+        let mut walk = Walk { root, accessors, most, scene: Self::default() };
+        let mut meshes: Vec<(usize, Transform)> = instances(root)?;
+        if root.nodes.is_empty() {
+            meshes = (0..root.meshes.len()).map(|mesh| (mesh, Transform::IDENTITY)).collect();
+        }
+        for (mesh, transform) in meshes {
+            walk.mesh(mesh, &transform)?;
+        }
+        Ok(walk.scene)
+    }
+}
+
+/// The meshes that nodes show, with their places. Every node is visited once: one with two parents, or above itself,
+/// is an error (glTF 2.0, 3.5.2). So the walk ends.
+fn instances(root: &Root) -> Result<Vec<(usize, Transform)>, GltfError> {
+    let mut waiting: Vec<(Index<Node>, Transform)> = Vec::new();
+    let identity = |node: &Index<Node>| (*node, Transform::IDENTITY);
+    match root.scene.map(|s| s.value()).or((!root.scenes.is_empty()).then_some(0)) {
+        Some(i) => {
+            let scene = root.scenes.get(i).ok_or_else(|| broken(format!("scenes[{i}]"), "there is none"))?;
+            waiting.extend(scene.nodes.iter().rev().map(identity));
+        }
+        None => waiting.extend(roots(root).iter().rev().map(identity)),
+    }
+    let mut visited = vec![false; root.nodes.len()];
+    let mut found = Vec::new();
+    while let Some((index, above)) = waiting.pop() {
+        let i = index.value();
+        let fail = |problem: &str| broken(format!("nodes[{i}]"), problem);
+        let node = root.nodes.get(i).ok_or_else(|| fail("there is none"))?;
+        if std::mem::replace(&mut visited[i], true) {
+            return Err(fail("it is the child of two nodes, or of itself"));
+        }
+        let here = above.then(&Transform::of(node));
+        found.extend(node.mesh.map(|mesh| (mesh.value(), here)));
+        waiting.extend(node.children.iter().flatten().rev().map(|child| (*child, here)));
+    }
+    Ok(found)
+}
+
+/// The nodes that are no children.
+fn roots(root: &Root) -> Vec<Index<Node>> {
+    let mut is_child = vec![false; root.nodes.len()];
+    for child in root.nodes.iter().flat_map(|n| n.children.iter().flatten()) {
+        if let Some(seen) = is_child.get_mut(child.value()) {
+            *seen = true;
+        }
+    }
+    (0..root.nodes.len()).filter(|i| !is_child[*i]).map(|i| Index::new(i as u32)).collect()
+}
+
+impl Walk<'_> {
+    /// Adds the primitives of a mesh.
+    fn mesh(&mut self, mesh: usize, transform: &Transform) -> Result<(), GltfError> {
+        let root = self.root;
+        let found = root.meshes.get(mesh).ok_or_else(|| broken(format!("meshes[{mesh}]"), "there is none"))?;
+        self.scene.names.extend(found.name.clone());
+        for (i, primitive) in found.primitives.iter().enumerate() {
+            self.primitive(primitive, transform, &format!("meshes[{mesh}].primitives[{i}]"))?;
+        }
+        Ok(())
+    }
+
+    fn primitive(&mut self, primitive: &Primitive, transform: &Transform, place: &str) -> Result<(), GltfError> {
+        let fail = |problem: &str| broken(place.to_owned(), problem);
+        let Checked::Valid(mode) = primitive.mode else { return Err(fail("an unknown mode")) };
+        if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+            let kind = if mode == Mode::Points { "points primitive" } else { "lines primitive" };
+            *self.scene.skipped.entry(kind).or_insert(0) += 1;
+            return Ok(());
+        }
+        let Some(positions) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) else {
+            return Err(fail("no positions"));
+        };
+        let points = self.accessors.positions(*positions)?;
+        let corners = match primitive.indices {
+            Some(indices) => self.accessors.indices(indices)?,
+            None => (0..points.len() as u32).collect(),
+        };
+        if let Some(corner) = corners.iter().find(|c| **c as usize >= points.len()) {
+            return Err(fail(&format!("index {corner}, but there are {} positions", points.len())));
+        }
+        let base = self.scene.points.len();
+        let total = (base + points.len()).max(self.scene.triangles.len() + corners.len());
+        if total as u64 > self.most {
+            let problem = format!("{total} points or triangles with all instances, more than {}", self.most);
+            return Err(GltfError::TooMuch { place: place.to_owned(), problem });
+        }
+        self.scene.points.extend(points.iter().map(|p| transform.of_point(*p)));
+        let base = base as u32;
+        let is_mirrored = transform.determinant() < 0.0;
+        self.scene.triangles.extend(triangles(mode, &corners).map(|[a, b, c]| {
+            let [b, c] = if is_mirrored { [c, b] } else { [b, c] };
+            [a, b, c].map(|v| base + v)
+        }));
+        Ok(())
+    }
+}
+
+/// The triangles of a list, a strip or a fan (glTF 2.0, 3.7.2.1).
+fn triangles(mode: Mode, corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    let count = if mode == Mode::Triangles { corners.len() / 3 } else { corners.len().saturating_sub(2) };
+    (0..count).map(move |i| match mode {
+        Mode::TriangleStrip => [corners[i], corners[i + 1 + i % 2], corners[i + 2 - i % 2]],
+        Mode::TriangleFan => [corners[i + 1], corners[i + 2], corners[0]],
+        _ => [corners[3 * i], corners[3 * i + 1], corners[3 * i + 2]],
+    })
+}
+
+impl Transform {
+    const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3]]);
+
+    /// That of a node: its matrix, or its scale, then its rotation, then its translation.
+    fn of(node: &Node) -> Self {
+        if let Some(m) = node.matrix {
+            let column = |k: usize| [0, 1, 2].map(|i| f64::from(m[4 * k + i]));
+            return Self([column(0), column(1), column(2), column(3)]);
+        }
+        let [x, y, z, w] = node.rotation.map_or([0.0, 0.0, 0.0, 1.0], |q| q.0.map(f64::from));
+        let rotation = [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)],
+            [2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)],
+            [2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ];
+        let scale = node.scale.map_or([1.0; 3], |s| s.map(f64::from));
+        let column = |k: usize| rotation[k].map(|r| r * scale[k]);
+        Self([column(0), column(1), column(2), node.translation.map_or([0.0; 3], |t| t.map(f64::from))])
+    }
+
+    /// First `inner`, then this one.
+    fn then(&self, inner: &Self) -> Self {
+        let [x, y, z, origin] = inner.0;
+        Self([self.of_vector(x), self.of_vector(y), self.of_vector(z), self.of_point(origin)])
+    }
+
+    fn of_vector(&self, v: [f64; 3]) -> [f64; 3] {
+        let m = &self.0;
+        [0, 1, 2].map(|i| m[0][i] * v[0] + m[1][i] * v[1] + m[2][i] * v[2])
+    }
+
+    fn of_point(&self, p: [f64; 3]) -> [f64; 3] {
+        let turned = self.of_vector(p);
+        [0, 1, 2].map(|i| turned[i] + self.0[3][i])
+    }
+
+    fn determinant(&self) -> f64 {
+        let [a, b, c, _] = self.0;
+        pipeline::space::dot(pipeline::space::cross(a, b), c)
+    }
+}
