@@ -219,7 +219,7 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
     if !travel.job.is_unchanged() {
         return travel.end(End::Changed);
     }
-    let content = stages::read_file(&travel.job.path);
+    let content = stages::read_input(&travel.job.path, &travel.shared.settings);
     if !travel.job.is_unchanged() {
         return travel.end(End::Changed);
     }

@@ -8,7 +8,7 @@ use bytesize::ByteSize;
 use pipeline::Order;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-pub use values::{FeatureAngle, HandOff, Inputs, Log, Off, OnCertified};
+pub use values::{FeatureAngle, HandOff, Inputs, LimitsSaid, Log, Off, OnCertified};
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
 /// the file alone.
@@ -52,6 +52,8 @@ pub struct Said {
     pub drain: Option<bool>,
     /// What becomes of certified inputs.
     pub inputs: Option<Inputs>,
+    /// What is too much for one input.
+    pub limits: Option<LimitsSaid>,
     /// Form of log messages.
     pub log: Option<Log>,
     /// How much more to log: 1 informs, 2 explains, 3 traces.
@@ -225,6 +227,7 @@ impl Said {
             recursive: self.recursive.or(other.recursive),
             drain: self.drain.or(other.drain),
             inputs: self.inputs.or(other.inputs),
+            limits: self.limits.or(other.limits),
             log: self.log.or(other.log),
             verbose: self.verbose.or(other.verbose),
             quiet: self.quiet.or(other.quiet),
@@ -290,7 +293,7 @@ impl Said {
             recursive: self.recursive.unwrap_or(false),
             drain: self.drain.unwrap_or(false),
             inputs: self.inputs.unwrap_or_default(),
-            limits: Limits::default(),
+            limits: self.limits.unwrap_or_default().or_default(),
             log: self.log.unwrap_or_default(),
             verbose: self.verbose.unwrap_or(0),
             quiet: self.quiet.unwrap_or(false),

@@ -34,7 +34,23 @@ pub fn guard<T, E: From<Reason>>(work: impl FnOnce() -> Result<T, E>) -> Result<
     })
 }
 
+/// Reads an input, as far as it is not too large.
+///
+/// # Errors
+/// The refusal.
+pub fn read_input(path: &Path, settings: &Settings) -> Result<Vec<u8>, Reason> {
+    let (size, most) = (std::fs::metadata(path).map_or(0, |m| m.len()), settings.limits.file);
+    if size > most {
+        let remedy = "split or decimate it, or raise `file` in the table [limits] of planish.toml";
+        return Err(Reason::new(Code::TooLarge, format!("the file has {size} bytes, more than {most}: {remedy}")));
+    }
+    read_file(path)
+}
+
 /// Reads a regular file whole. Anything else (a folder, a pipe, a device) could block for ever.
+///
+/// # Errors
+/// Why it cannot be read.
 pub fn read_file(path: &Path) -> Result<Vec<u8>, Reason> {
     let unreadable = |why: String| Reason::new(Code::Unreadable, format!("cannot read the file: {why}"));
     let metadata = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?;

@@ -47,7 +47,7 @@ pub struct Limits {
     pub file: u64,
     /// Points, and triangles.
     pub elements: u64,
-    /// Bytes that compressed data may become, all together, per byte of the file.
+    /// Bytes that compressed data and repeated parts may become, all together, per byte of the file.
     pub expansion: u64,
     /// Levels of nested nodes, groups, elements.
     pub depth: usize,
@@ -55,7 +55,7 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { file: 16 << 30, elements: TriangleSoup::MAX_TRIANGLES as u64, expansion: 1000, depth: 64 }
+        Self { file: 16 << 30, elements: TriangleSoup::MAX_TRIANGLES as u64, expansion: 100, depth: 256 }
     }
 }
 

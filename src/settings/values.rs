@@ -1,5 +1,7 @@
 //! The values that settings can have.
 
+use crate::formats::Limits;
+use bytesize::ByteSize;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -107,4 +109,31 @@ pub struct OnCertified {
 
 fn an_hour() -> f64 {
     3600.0
+}
+
+/// What is too much for one input: the table `[limits]` of planish.toml. Files may come from anyone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitsSaid {
+    /// The size of a file, and of all that it takes along.
+    pub file: Option<ByteSize>,
+    /// Points, and triangles.
+    pub elements: Option<u64>,
+    /// What compressed data and repeated parts may become, per byte of the file.
+    pub expansion: Option<u64>,
+    /// Levels of nesting.
+    pub depth: Option<usize>,
+}
+
+impl LimitsSaid {
+    /// What was said, and the defaults where nothing was.
+    pub(super) fn or_default(self) -> Limits {
+        let usual = Limits::default();
+        Limits {
+            file: self.file.map_or(usual.file, |size| size.as_u64()),
+            elements: self.elements.unwrap_or(usual.elements),
+            expansion: self.expansion.unwrap_or(usual.expansion),
+            depth: self.depth.unwrap_or(usual.depth),
+        }
+    }
 }

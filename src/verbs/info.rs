@@ -6,7 +6,7 @@ use crate::job::Job;
 use crate::outcome::Reason;
 use crate::report::{self, Counts, Repairs, Surface};
 use crate::settings::Settings;
-use crate::stages::{Folder, decode, guard, read_file, repaired};
+use crate::stages::{Folder, decode, guard, read_input, repaired};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -42,7 +42,10 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
 fn answer(job: &Job, settings: &Settings) -> Answer {
     let input = job.path.to_string_lossy().into_owned();
     let found = guard(|| {
-        repaired(&decode(&job.path, &read_file(&job.path)?, settings, &Folder::of(&job.path))?.soup, settings)
+        repaired(
+            &decode(&job.path, &read_input(&job.path, settings)?, settings, &Folder::of(&job.path))?.soup,
+            settings,
+        )
     });
     match found {
         Ok(found) => Answer {
