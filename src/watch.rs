@@ -75,6 +75,8 @@ pub struct Eyes {
     inbox: PathBuf,
     recursive: bool,
     hints: Receiver<()>,
+    /// Kept, so that the channel never closes: a closed one would be heard all the time.
+    _tell: Sender<()>,
     watcher: Option<RecommendedWatcher>,
     /// The folder that is watched: another one may take its name.
     watched: Option<Identity>,
@@ -89,11 +91,12 @@ impl Eyes {
     /// Eyes for the folder `inbox` (and, if asked, its sub-folders); without hints, if `poll`.
     pub fn new(inbox: &Path, recursive: bool, poll: bool) -> Self {
         let (tell, hints) = bounded(1);
-        let watcher = if poll { None } else { watcher(tell) };
+        let watcher = if poll { None } else { watcher(tell.clone()) };
         Self {
             inbox: inbox.to_owned(),
             recursive,
             hints,
+            _tell: tell,
             watcher,
             watched: None,
             is_missing: false,
@@ -304,6 +307,16 @@ mod tests {
         )
         .expect("made");
         assert_eq!(names(Eyes::new(&inbox, false, true).look()), ["a.stl", "hard.stl", "inside.stl"]);
+    }
+
+    #[test]
+    fn where_no_hints_come_none_are_heard() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut eyes = Eyes::new(folder.path(), false, true);
+        assert!(eyes.hints.try_recv().is_err_and(|e| e.is_empty()), "closed");
+        eyes.watcher = watcher(eyes._tell.clone());
+        eyes.watcher = None;
+        assert!(eyes.hints.try_recv().is_err_and(|e| e.is_empty()), "closed");
     }
 
     #[test]
