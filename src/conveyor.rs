@@ -374,8 +374,10 @@ fn log(report: &Report) {
     }
 }
 
-/// A result stands: what is certified goes to the commands, where there are any.
+/// A result stands: what is certified goes to the commands, where there are any. These may take hours, and memory of
+/// their own.
 fn published(travel: Arc<Travel>, done: Done, chain: &Sender<Chained>) {
+    travel.give_memory_back();
     if done.report.status == Status::Certified && chain::is_asked_for(&travel.shared.settings) {
         hand_on(chain, Chained { travel, done });
     } else {

@@ -14,6 +14,7 @@ use pipeline::host::Host;
 use rustix::time::{ClockId, clock_gettime};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use tracing::Span;
 
 /// What all threads share.
@@ -43,7 +44,7 @@ pub(super) struct Travel {
     pub job: Arc<Job>,
     pub number: u64,
     turn: Turn,
-    memory: u64,
+    memory: AtomicU64,
     span: Span,
     seconds: Mutex<BTreeMap<&'static str, f64>>,
     end: Mutex<Option<End>>,
@@ -61,7 +62,7 @@ impl Travel {
         shared.budget.take(Account::Input, memory, turn);
         let span = tracing::info_span!("job", input = %job.name.display());
         span.in_scope(|| tracing::info!("begins"));
-        let (seconds, end) = (Mutex::default(), Mutex::new(None));
+        let (memory, seconds, end) = (memory.into(), Mutex::default(), Mutex::new(None));
         Arc::new(Self { shared: shared.clone(), job, number, turn, memory, span, seconds, end })
     }
 
@@ -93,6 +94,11 @@ impl Travel {
         seconds.iter().map(|(stage, s)| ((*stage).to_owned(), (s * 1e3).round() / 1e3)).collect()
     }
 
+    /// The data of the input is gone: others may take its memory.
+    pub fn give_memory_back(&self) {
+        self.shared.budget.give_back(Account::Input, self.memory.swap(0, Ordering::Relaxed));
+    }
+
     /// How the job ended.
     pub fn end(&self, end: End) {
         *self.end.lock() = Some(end);
@@ -101,7 +107,7 @@ impl Travel {
 
 impl Drop for Travel {
     fn drop(&mut self) {
-        self.shared.budget.give_back(Account::Input, self.memory);
+        self.give_memory_back();
         self.shared.board.remove(self.number);
         self.shared.queue.ended(&self.job);
         let end = self.end.get_mut().take().unwrap_or(End::Lost);

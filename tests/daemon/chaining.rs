@@ -63,6 +63,21 @@ fn commands_that_were_broken_off_run_again_and_ends_of_commands_are_told() {
     w.stop();
 }
 
+/// Memory is for inputs on their way: one on which a command runs has arrived.
+#[test]
+fn a_command_that_takes_long_keeps_no_memory_from_other_inputs() {
+    let sleeps = "[[on_certified]]\ncommand = [\"sh\", \"-c\", \"test {name} != large.stl || sleep 600\"]\n";
+    let mut w = Watched::configured(sleeps, &["--memory", "16MiB", "--jobs", "2"]);
+    let (large, small) = (disk(60, 0.0), disk(4, 0.0));
+    w.drop_in("large.stl", &large);
+    w.start();
+    w.wait_until("the command runs", |w| w.status()["running"][0]["stage"] == "chain");
+    w.drop_in("small.stl", &small);
+    w.wait_until("the small one is done", |w| account(w, "small.stl").is_some());
+    assert!(account(&w, "large.stl").is_none(), "its command still runs: else the test has lost its sense");
+    w.stop();
+}
+
 /// Newer content while a command runs on the older one.
 #[test]
 fn commands_on_a_superseded_result_are_broken_off() {
