@@ -76,7 +76,7 @@ impl Budget {
     }
 
     fn fits(&self, state: &State, account: Account, bytes: u64) -> bool {
-        let taken = state.taken.iter().sum::<u64>();
+        let taken = state.taken[0].saturating_add(state.taken[1]);
         state.taken[account as usize] == 0 || taken.saturating_add(bytes) <= self.limit
     }
 }
@@ -113,6 +113,16 @@ mod tests {
         assert!(!budget.try_take(Account::Input, 1));
         assert!(budget.try_take(Account::Factor, 50) && !budget.try_take(Account::Factor, 50));
         budget.give_back(Account::Input, 400);
+        assert!(budget.try_take(Account::Factor, 50));
+    }
+
+    #[test]
+    fn an_input_that_claims_all_memory_there_is_does_no_harm() {
+        let budget = Budget::new(100);
+        budget.take(Account::Factor, 50, 0);
+        budget.take(Account::Input, u64::MAX, 0);
+        assert!(!budget.try_take(Account::Factor, 50) && !budget.try_take(Account::Input, 1));
+        budget.give_back(Account::Input, u64::MAX);
         assert!(budget.try_take(Account::Factor, 50));
     }
 }
