@@ -15,7 +15,8 @@ pub fn start(settings: &Settings, is_daemon: bool) {
         (false, _) => LevelFilter::TRACE,
     };
     let builder = tracing_subscriber::fmt().with_max_level(level).with_writer(std::io::stderr).with_target(false);
-    let builder = builder.with_ansi(std::io::stderr().is_terminal());
+    // That a message is lost (a full disk, a closed pipe) is no reason to break down, as its complaint about that would.
+    let builder = builder.with_ansi(std::io::stderr().is_terminal()).log_internal_errors(false);
     // A second call, as tests make it, keeps the first subscriber.
     let _ = match settings.log {
         Log::Text => tracing::subscriber::set_global_default(builder.finish()),

@@ -14,7 +14,7 @@ fn main() -> ExitCode {
     });
     ended
         .unwrap_or_else(|error| {
-            eprintln!("planish: {error}");
+            verbs::complain(&error.to_string());
             Exit::Usage
         })
         .into()

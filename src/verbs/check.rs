@@ -5,7 +5,7 @@
 //! claims beyond that must agree with what is found. Checksums are a second, separate test: a map that is broken
 //! fails the first one even if all checksums were made anew.
 
-use super::{Exit, say, shown};
+use super::{Exit, complain, say, shown};
 use crate::formats::gmsh;
 use crate::formats::vtu::{self, Grid};
 use crate::outcome::{Reason, Status};
@@ -65,7 +65,7 @@ pub fn check(results: &[PathBuf], quiet: bool) -> Exit {
             found.proven.iter().for_each(|line| say(&format!("{name}: {line}")));
         }
         for finding in &found.wrong {
-            eprintln!("planish: {name}: not proven: {finding}");
+            complain(&format!("{name}: not proven: {finding}"));
             exit = Exit::Refused;
         }
     }

@@ -18,6 +18,11 @@ fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
+/// Prints a line on standard error, where somebody reads it.
+pub fn complain(line: &str) {
+    let _ = writeln!(std::io::stderr(), "planish: {line}");
+}
+
 /// A path as it may be shown: on one line, whatever its bytes.
 fn shown(path: &Path) -> String {
     path.to_string_lossy().escape_debug().to_string()

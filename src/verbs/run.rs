@@ -1,6 +1,6 @@
 //! `planish run`: process files, once.
 
-use super::{Exit, shown};
+use super::{Exit, complain, shown};
 use crate::conveyor::Conveyor;
 use crate::inputs;
 use crate::job::{Done, End, Job};
@@ -140,14 +140,14 @@ fn cells(name: String, done: &Done) -> Vec<String> {
 fn tell_trouble(job: &Job, end: &End) {
     let input = shown(&job.path);
     match end {
-        End::Unwritten(error) => eprintln!("planish: {input}: {error}"),
-        End::Unchained(_, error) => eprintln!("planish: {input}: certified, but {error}"),
-        End::Changed => eprintln!("planish: {input}: it changed while it was read; try again"),
-        End::Waiting(reason) => eprintln!("planish: {input}: {}", reason.message),
-        End::Lost => eprintln!("planish: {input}: planish broke down; that is a fault of planish: please report it"),
+        End::Unwritten(error) => complain(&format!("{input}: {error}")),
+        End::Unchained(_, error) => complain(&format!("{input}: certified, but {error}")),
+        End::Changed => complain(&format!("{input}: it changed while it was read; try again")),
+        End::Waiting(reason) => complain(&format!("{input}: {}", reason.message)),
+        End::Lost => complain(&format!("{input}: planish broke down; that is a fault of planish: please report it")),
         End::Done(Done { report: Report { reason: Some(reason), status, .. }, .. }) => {
             let place = reason.place.as_ref().map_or(String::new(), |p| format!(" ({p})"));
-            eprintln!("planish: {input}: {status}: {}{place} [{}]", reason.message, reason.code.name());
+            complain(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
         }
         End::Done(_) | End::Unwanted => {}
     }

@@ -110,6 +110,23 @@ fn sub_folders_are_watched_when_asked_for_and_sidecars_never() {
     }
 }
 
+/// Nobody reads what is said: the disk of the log is full, say.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_log_that_cannot_be_written_stops_nothing() {
+    let mut w = Watched::new(&[]);
+    let bytes = disk(5, 0.0);
+    w.drop_in("a.stl", &bytes);
+    w.drop_in("garbage.stl", b"garbage");
+    let full = || fs::File::options().write(true).open("/dev/full").expect("a device");
+    w.start_with(|command| command.stderr(full()));
+    w.wait_for(&[("a.stl", &bytes), ("garbage.stl", b"garbage")]);
+    w.stop();
+    let mut run = std::process::Command::new(env!("CARGO_BIN_EXE_planish"));
+    run.arg("run").arg(w.inbox()).arg("--out").arg(w.out.path()).stdout(full()).stderr(full());
+    assert_eq!(run.status().expect("runs").code(), Some(1), "one is refused");
+}
+
 #[test]
 fn folders_in_each_other_and_second_daemons_are_refused() {
     let mut w = Watched::new(&[]);
