@@ -118,14 +118,22 @@ impl<'a> Daemon<'a> {
 
     /// Looks at the inbox, and does what follows from that.
     fn look(&mut self, now: Instant) {
-        if let Some(listing) = self.eyes.look() {
+        let listing = self.eyes.look();
+        self.next_look = now + self.eyes.period();
+        if let Some(listing) = listing {
             self.untold |= self.inbox.due().is_some();
             for change in self.inbox.look(&listing, now) {
                 self.follow(change);
             }
+            self.look_when_due();
         }
-        let regular = now + self.eyes.period();
-        self.next_look = self.inbox.due().map_or(regular, |due| due.min(regular)).max(self.eyes.rested());
+        self.next_look = self.next_look.max(self.eyes.rested());
+    }
+
+    /// The next look comes when a file may have settled, but not before the last one has rested.
+    fn look_when_due(&mut self) {
+        let due = self.inbox.due().map(|due| due.max(self.eyes.rested()));
+        self.next_look = due.map_or(self.next_look, |due| due.min(self.next_look));
     }
 
     fn follow(&mut self, change: Change) {
@@ -168,7 +176,7 @@ impl<'a> Daemon<'a> {
                     self.inbox.again(&job.name, &look, Instant::now() + AGAIN);
                 }
             }
-            self.next_look = self.inbox.due().map_or(self.next_look, |due| due.min(self.next_look));
+            self.look_when_due();
         }
     }
 

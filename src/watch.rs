@@ -144,13 +144,16 @@ impl Eyes {
     /// means that there are no files.
     pub fn look(&mut self) -> Option<Listing> {
         let began = Instant::now();
-        let listing = match std::fs::metadata(&self.inbox) {
-            Ok(metadata) => {
+        let seen = std::fs::metadata(&self.inbox).and_then(|metadata| {
+            self.watch_again(Identity::of(&metadata));
+            self.scan()
+        });
+        let listing = match seen {
+            Ok(listing) => {
                 if std::mem::take(&mut self.is_missing) {
                     tracing::info!(inbox = %self.inbox.display(), "the inbox is back");
                 }
-                self.watch_again(Identity::of(&metadata));
-                self.scan()
+                Some(listing)
             }
             Err(error) => self.not_there(&error),
         };
@@ -161,10 +164,13 @@ impl Eyes {
 
     fn not_there(&mut self, error: &io::Error) -> Option<Listing> {
         if !std::mem::replace(&mut self.is_missing, true) {
-            tracing::warn!(inbox = %self.inbox.display(), "cannot see the inbox: {error}; make it again, or mount it");
+            tracing::warn!(inbox = %self.inbox.display(), "cannot see the inbox: {error}; make it again, mount it, or let it be read");
         }
-        self.watched = None;
-        (error.kind() == ErrorKind::NotFound).then(Listing::new)
+        let is_gone = error.kind() == ErrorKind::NotFound;
+        if is_gone {
+            self.watched = None;
+        }
+        is_gone.then(Listing::new)
     }
 
     /// Asks for hints of the folder that has the name of the inbox now.
@@ -189,7 +195,7 @@ impl Eyes {
     }
 
     /// Scans the folder.
-    fn scan(&mut self) -> Option<Listing> {
+    fn scan(&mut self) -> io::Result<Listing> {
         let mut listing = Listing::new();
         let depth = if self.recursive { usize::MAX } else { 1 };
         let is_open = |e: &DirEntry| e.depth() == 0 || !e.file_name().to_string_lossy().starts_with('.');
@@ -202,14 +208,11 @@ impl Eyes {
                     }
                 }
                 // Files may go at any moment; of the folder as a whole, nothing is known then.
-                Err(error) if error.depth() == 0 => {
-                    tracing::warn!(inbox = %inbox.display(), "cannot read the inbox: {error}");
-                    return None;
-                }
+                Err(error) if error.depth() == 0 => return Err(error.into()),
                 Err(error) => tracing::debug!("passed over: {error}"),
             }
         }
-        Some(listing)
+        Ok(listing)
     }
 
     /// A file that may hold a mesh, by its path below the inbox.
