@@ -115,6 +115,10 @@ impl Publisher {
         if !*open || !wanted() {
             return Ok(false);
         }
+        // Writing took its time: somebody may have put something there.
+        if !may_be_replaced(&target) {
+            return Err(PublishError::Foreign(target));
+        }
         let folder = self.folder_for(name)?;
         put_in_place(&fresh, &target, parent.path()).map_err(at(&target))?;
         sync_folder(&folder).map_err(at(&folder)).map(|()| true)
@@ -300,6 +304,14 @@ mod tests {
         assert!(out.path().join("folder.stl/precious.txt").exists());
         fs::create_dir(out.path().join("empty.stl")).expect("made");
         assert!(publisher.publish(Path::new("empty.stl"), &files("new"), || true).is_ok());
+        let late = out.path().join("late.stl");
+        let put_there = || {
+            fs::create_dir(&late).and_then(|()| fs::write(late.join("precious.txt"), "work")).expect("written");
+            true
+        };
+        let refused = publisher.publish(Path::new("late.stl"), &files("new"), put_there);
+        assert!(matches!(refused, Err(PublishError::Foreign(_))), "{refused:?}");
+        assert!(late.join("precious.txt").exists());
     }
 
     #[test]
