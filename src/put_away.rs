@@ -82,9 +82,15 @@ fn put_in_free_place(file: &Path, place: &Path, folder: &Path) -> io::Result<()>
     match fs::hard_link(file, place) {
         Err(e) if e.kind() != ErrorKind::AlreadyExists => {
             let mut copy = tempfile::Builder::new().prefix(HOLDING).tempfile_in(folder)?;
-            io::copy(&mut fs::File::open(file)?, &mut copy)?;
+            let mut from = fs::File::open(file)?;
+            let metadata = from.metadata()?;
+            io::copy(&mut from, &mut copy)?;
+            copy.as_file().set_permissions(metadata.permissions())?;
+            copy.as_file().set_modified(metadata.modified()?)?;
             copy.as_file().sync_all()?;
-            copy.persist_noclobber(place).map(drop).map_err(|e| e.error)
+            copy.persist_noclobber(place).map_err(|e| e.error)?;
+            // The original is removed next.
+            fs::File::open(folder)?.sync_all()
         }
         ended => ended,
     }
@@ -170,6 +176,28 @@ mod tests {
         }
         assert_eq!(place.all(), ["done/a.2.stl", "done/a.3.stl", "done/a.stl"]);
         assert_eq!(fs::read_to_string(place.path("done/a.2.stl")).expect("there"), "two");
+    }
+
+    /// Memory is another file system than the disk.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn copies_on_other_file_systems_keep_time_and_permissions() {
+        use std::os::unix::fs::PermissionsExt;
+        let (place, elsewhere) = (Place::new(), tempfile::tempdir_in("/dev/shm").expect("a folder"));
+        place.write("a.stl", "one");
+        let time = std::time::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000_000);
+        let file = fs::File::options().append(true).open(place.path("a.stl")).expect("there");
+        file.set_modified(time).and_then(|()| file.set_permissions(fs::Permissions::from_mode(0o644))).expect("set");
+        let seen = Look::at(&place.path("a.stl")).expect("there").expect("a file");
+        let moved = elsewhere.path().join("done/a.stl");
+        put_away(&place.path("a.stl"), &seen, Way::To(&moved)).expect("moved");
+        let metadata = fs::metadata(&moved).expect("there");
+        assert_eq!((metadata.modified().expect("a time"), metadata.permissions().mode() & 0o777), (time, 0o644));
+        assert!(place.all().is_empty() && names(moved.parent().expect("a folder")) == ["a.stl"]);
+    }
+
+    fn names(folder: &Path) -> Vec<std::ffi::OsString> {
+        fs::read_dir(folder).expect("there").flatten().map(|e| e.file_name()).collect()
     }
 
     #[test]
