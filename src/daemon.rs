@@ -158,6 +158,8 @@ impl<'a> Daemon<'a> {
             && !done.up_to_date
         {
             self.status.ended.count(done.report.status);
+        } else if matches!(end, End::Lost) {
+            tracing::error!(input = %job.name.display(), "a stage broke down: that is a fault of planish; please report it");
         }
         // A withdrawn job says nothing about the file that has its name now.
         if self.jobs.get(&job.name).is_some_and(|current| Arc::ptr_eq(current, &job)) {
