@@ -4,8 +4,6 @@ use crate::outcome::{Reason, Status};
 use crate::report::{self, Input, Output, Report};
 use crate::stages::{beside, read_file};
 use serde::Deserialize;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use walkdir::{DirEntry, WalkDir};
 
@@ -49,7 +47,7 @@ pub fn entries(out: &Path) -> impl Iterator<Item = (PathBuf, Entry)> {
                 folders.skip_current_dir();
             } else if found.file_name() == report::FILE {
                 folders.skip_current_dir();
-                let entry = File::open(found.path()).ok().and_then(|f| serde_json::from_reader(BufReader::new(f)).ok());
+                let entry = read_file(found.path()).ok().and_then(|text| serde_json::from_slice(&text).ok());
                 let name = found.path().parent().and_then(|p| p.strip_prefix(&out).ok()).map(Path::to_owned);
                 if let Some(pair) = name.zip(entry) {
                     return Some(pair);
@@ -76,6 +74,13 @@ mod tests {
         write("a/c.stl", &format!(r#"{{"status": "refused", "reason": {reason}}}"#));
         write(".planish/run-1/d.stl", r#"{"status": "certified", "reason": null}"#);
         write("broken.stl", "{");
+        #[cfg(unix)]
+        {
+            use rustix::fs::{CWD, FileType, Mode, mknodat};
+            let pipe = out.path().join("pipe.stl");
+            std::fs::create_dir(&pipe).expect("made");
+            mknodat(CWD, pipe.join(report::FILE), FileType::Fifo, Mode::RUSR, 0).expect("made");
+        }
         let found: Vec<_> = entries(out.path()).map(|(name, e)| (name.display().to_string(), e.status)).collect();
         assert_eq!(found, [("a/c.stl".to_owned(), Status::Refused), ("b.stl".to_owned(), Status::Certified)]);
     }
