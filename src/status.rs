@@ -8,7 +8,7 @@ use crate::outcome::{Code, Status as Outcome};
 use crate::publish::STAGING;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -161,10 +161,10 @@ impl Lock {
     /// # Errors
     /// Where the file cannot be written.
     pub fn tell(&self, status: &Status, staging: &Path) -> io::Result<()> {
-        let mut file = tempfile::NamedTempFile::new_in(staging)?;
-        serde_json::to_writer(&mut file, status)?;
-        file.flush()?;
-        file.persist(&self.status).map(drop).map_err(|e| e.error)
+        // Whoever may read the results may read this: a temporary file would be its owner's alone.
+        let fresh = staging.join("status.fresh");
+        fs::write(&fresh, serde_json::to_vec(status)?)?;
+        fs::rename(fresh, &self.status)
     }
 }
 
@@ -212,6 +212,12 @@ mod tests {
         let status = Status { pid: 42, waiting: 3, ..Status::default() };
         daemon.tell(&status, &staging).expect("written");
         assert_eq!(told(out.path()), Some(status));
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            let mode = |name: &str| fs::metadata(staging.join(name)).expect("there").permissions().mode();
+            assert_eq!(mode(STATUS), mode(LOCK_FILE), "the same may read both");
+        }
         assert!(matches!(Lock::take(out.path()), Err(LockError::Busy { pid: Some(42), .. })));
         drop(daemon);
         assert!(!is_running(out.path()) && told(out.path()).is_none());
