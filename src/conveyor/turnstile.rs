@@ -5,7 +5,7 @@
 //! safe points a long computation lets those ahead of it pass.
 
 use super::queue::Turn;
-use parking_lot::{Condvar, Mutex};
+use parking_lot::{Condvar, Mutex, MutexGuard};
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -34,7 +34,10 @@ impl Turnstile {
 
     /// Waits for a place.
     pub fn enter(&self, turn: Turn) {
-        let mut state = self.state.lock();
+        self.wait(self.state.lock(), turn);
+    }
+
+    fn wait(&self, mut state: MutexGuard<State>, turn: Turn) {
         state.tickets += 1;
         let me = (turn, state.tickets);
         state.waiting.insert(me);
@@ -59,8 +62,11 @@ impl Turnstile {
     /// Called from inside: lets those ahead of `turn` pass.
     pub fn let_pass(&self, turn: Turn) {
         if self.ahead.load(Ordering::Relaxed) < turn {
-            self.leave();
-            self.enter(turn);
+            // In one step, so that none of those behind slips in before.
+            let mut state = self.state.lock();
+            state.free += 1;
+            self.moved.notify_all();
+            self.wait(state, turn);
         }
     }
 
