@@ -6,6 +6,7 @@ use crate::publish::Publisher;
 use crate::put_away::{PutAwayError, Way, put_away};
 use crate::report::Report;
 use crate::settings::{Inputs, Settings};
+use std::time::{Duration, Instant};
 
 /// Why what should follow did not.
 #[derive(Debug, thiserror::Error)]
@@ -18,23 +19,38 @@ pub enum ChainError {
     PutAway(#[from] PutAwayError),
 }
 
+/// How long a file must have been as it is before it is put away. A writer that pauses for longer loses what it writes
+/// later; one that pauses for less is waited for.
+const QUIET: Duration = Duration::from_secs(10);
+
+/// What became of what follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Followed {
+    /// All is done.
+    Whole,
+    /// The job was no longer wanted.
+    BrokenOff,
+    /// All is done but that the input is put away: it is too early for that.
+    Until(Instant),
+}
+
 /// Whether anything follows.
 pub fn is_asked_for(settings: &Settings) -> bool {
     !settings.on_certified.is_empty() || settings.inputs != Inputs::Keep
 }
 
 /// Runs the commands that are due on the certified result of `job`. Where all of them have succeeded, and no part of the
-/// input was refused, puts the input away. False: the job was no longer wanted before that was done.
+/// input was refused, puts the input away.
 ///
 /// # Errors
 /// [`ChainError`] where the system fails; a command that fails is told in hooks.json.
-pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publisher) -> Result<bool, ChainError> {
+pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publisher) -> Result<Followed, ChainError> {
     let target = Target::new(&job.path, &publisher.target(&job.name))?;
     let hooks = &settings.on_certified;
     if hooks::are_due(hooks, &target) {
         tracing::info!(commands = hooks.len(), "runs commands");
         let Some(account) = hooks::run(hooks, &target, publisher.staging(), &|| job.is_wanted())? else {
-            return Ok(false);
+            return Ok(Followed::BrokenOff);
         };
         if account.failure().is_none() {
             tracing::info!("commands have succeeded");
@@ -44,17 +60,25 @@ pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publishe
     // With files beside it, an input would lose its sense elsewhere; and they may belong to others, too.
     let is_alone = report.input.beside.is_empty();
     if all_succeeded && is_alone && report.refused_components.is_empty() {
-        done_with(job, settings)?;
+        return Ok(done_with(job, settings)?);
     }
-    Ok(true)
+    Ok(Followed::Whole)
 }
 
-/// Puts the input away, as the settings say.
-fn done_with(job: &Job, settings: &Settings) -> Result<(), PutAwayError> {
-    let Some(seen) = &job.look else { return Ok(()) };
-    match &settings.inputs {
-        Inputs::Keep => Ok(()),
-        Inputs::Delete => put_away(&job.path, seen, Way::Nowhere),
-        Inputs::Move(folder) => put_away(&job.path, seen, Way::To(&folder.join(&job.name))),
+/// Puts the input away, as the settings say; inputs of an inbox only.
+fn done_with(job: &Job, settings: &Settings) -> Result<Followed, PutAwayError> {
+    let (Some(seen), Some(since)) = (&job.look, job.since) else { return Ok(Followed::Whole) };
+    let target;
+    let way = match &settings.inputs {
+        Inputs::Keep => return Ok(Followed::Whole),
+        Inputs::Delete => Way::Nowhere,
+        Inputs::Move(folder) => {
+            target = folder.join(&job.name);
+            Way::To(&target)
+        }
+    };
+    if since.elapsed() < QUIET {
+        return Ok(Followed::Until(since + QUIET));
     }
+    put_away(&job.path, seen, way).map(|()| Followed::Whole)
 }

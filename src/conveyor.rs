@@ -21,7 +21,7 @@ mod surface;
 mod travel;
 pub mod turnstile;
 
-use crate::chain;
+use crate::chain::{self, Followed};
 use crate::formats::Content;
 use crate::job::{Done, End, Job, Stage, Stopped};
 use crate::ledger;
@@ -38,6 +38,7 @@ use pipeline::atlas::Chart;
 use pipeline::host::Host;
 use pipeline::mesh::TriangleSoup;
 use queue::Queue;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -97,7 +98,7 @@ impl Conveyor {
         let (shared, refused, checked) = (self.shared.clone(), finished.clone(), chain.clone());
         self.thread("read", move || {
             while let Some(waiting) = shared.queue.pop(belt) {
-                read(Travel::begin(&shared, waiting), &soups, &refused, &checked);
+                survive(|| read(Travel::begin(&shared, waiting), &soups, &refused, &checked));
             }
         })?;
         let refused = finished.clone();
@@ -119,7 +120,7 @@ impl Conveyor {
     ) -> std::io::Result<()> {
         for _ in 0..count {
             let (input, work) = (input.clone(), work.clone());
-            self.thread(name, move || input.iter().for_each(&work))?;
+            self.thread(name, move || input.iter().for_each(|item| survive(|| work(item))))?;
         }
         Ok(())
     }
@@ -171,6 +172,16 @@ impl Conveyor {
     }
 }
 
+/// Does `work`. A panic in it, outside of what is computed for a job, drops what the stage holds, so that the job is told
+/// to be lost; the stage goes on.
+fn survive(work: impl FnOnce()) {
+    if catch_unwind(AssertUnwindSafe(work)).is_err() {
+        tracing::error!(
+            "a stage broke down: that is a fault of planish; please report it, with what was logged at -vv"
+        );
+    }
+}
+
 /// What decomposition gets.
 struct Soup {
     travel: Arc<Travel>,
@@ -219,6 +230,10 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
     if !travel.job.is_unchanged() {
         return travel.end(End::Changed);
     }
+    if let Err(error) = travel.shared.publisher.admits(&travel.job.name) {
+        let _in_stage = travel.in_stage(Stage::Read);
+        return unwritten(&travel, error);
+    }
     let content = stages::read_input(&travel.job.path, &travel.shared.settings);
     if !travel.job.is_unchanged() {
         return travel.end(End::Changed);
@@ -252,7 +267,7 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
             tracing::info!(status = %older.status, "is up to date");
             published(travel.clone(), Done { report: older, up_to_date: true }, chain);
         }
-        Err(Stopped::For(reason)) if reason.code == Code::MissingFile && travel.job.look.is_some() => {
+        Err(Stopped::For(reason)) if reason.code == Code::MissingFile && travel.job.since.is_some() => {
             travel.end(End::Waiting(reason));
         }
         Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
@@ -342,11 +357,8 @@ fn write(finished: Finished, chain: &Sender<Chained>) {
             log(&report);
             published(travel.clone(), Done { report, up_to_date: false }, chain);
         }
-        Ok(false) => travel.end(End::Unwanted),
-        Err(error) => {
-            tracing::error!("the result is not written: {error}");
-            travel.end(End::Unwritten(error));
-        }
+        Ok(false) => travel.end(if travel.job.is_wanted() { End::Changed } else { End::Unwanted }),
+        Err(error) => unwritten(&travel, error),
     }
 }
 
@@ -361,9 +373,14 @@ fn refuse(report: &mut Report, reason: Reason) {
     report.reason = Some(reason);
 }
 
+fn unwritten(travel: &Travel, error: PublishError) {
+    tracing::error!("the result is not written: {error}");
+    travel.end(End::Unwritten(error));
+}
+
 fn publish(travel: &Travel, report: &Report, mut files: Files) -> Result<bool, PublishError> {
     files.push((report::FILE.to_owned(), report.to_json().map_err(PublishError::Report)?));
-    travel.shared.publisher.publish(&travel.job.name, &files, || travel.job.is_wanted())
+    travel.shared.publisher.publish(&travel.job.name, &files, || travel.job.is_wanted() && travel.job.is_unchanged())
 }
 
 fn log(report: &Report) {
@@ -391,8 +408,9 @@ fn follow_up(Chained { travel, done }: Chained) {
     let _in_stage = travel.in_stage(Stage::Chain);
     let Shared { settings, publisher, .. } = &*travel.shared;
     travel.end(match chain::run(&travel.job, &done.report, settings, publisher) {
-        Ok(true) => End::Done(done),
-        Ok(false) => End::Unwanted,
+        Ok(Followed::Whole) => End::Done(done),
+        Ok(Followed::BrokenOff) => End::Unwanted,
+        Ok(Followed::Until(then)) => End::Later(done, then),
         Err(error) => {
             tracing::error!("{error}");
             End::Unchained(done, error.to_string())

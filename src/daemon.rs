@@ -3,6 +3,7 @@
 use crate::conveyor::{Conveyor, Ended};
 use crate::inbox::{Change, Inbox};
 use crate::job::{End, Job};
+use crate::logging::shown;
 use crate::settings::Settings;
 use crate::status::{Counts, Lock, NAMED, Progress, Status};
 use crate::watch::{Event, Eyes, Stop};
@@ -19,6 +20,11 @@ const TELL: Duration = Duration::from_millis(500);
 
 /// How long jobs have to reach a safe point when the daemon stops.
 const PATIENCE: Duration = Duration::from_secs(3);
+
+/// The output folder was removed, or another one has its name.
+#[derive(Debug, thiserror::Error)]
+#[error("the output folder was removed or replaced while results were written to it; start the daemon again")]
+pub struct OutIsGone;
 
 /// What the daemon is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,8 +82,14 @@ impl<'a> Daemon<'a> {
     }
 
     /// Watches until it is asked to stop, and has stopped. Returns what has ended.
-    pub fn run(mut self, stop: &Stop) -> Counts {
+    ///
+    /// # Errors
+    /// [`OutIsGone`]: there is no place for results any more.
+    pub fn run(mut self, stop: &Stop) -> Result<Counts, OutIsGone> {
         loop {
+            if !self.lock.is_held() {
+                return Err(OutIsGone);
+            }
             let now = Instant::now();
             if self.phase == Phase::Watching && now >= self.next_look {
                 self.look(now);
@@ -99,7 +111,7 @@ impl<'a> Daemon<'a> {
                 Phase::Stopping(latest) => self.jobs.is_empty() || Instant::now() >= latest,
             };
             if over {
-                return self.status.ended;
+                return Ok(self.status.ended);
             }
         }
     }
@@ -138,15 +150,15 @@ impl<'a> Daemon<'a> {
 
     fn follow(&mut self, change: Change) {
         match change {
-            Change::Settled(name, look) => {
-                tracing::debug!(input = %name.display(), bytes = look.bytes, "settled");
-                let job = Arc::new(Job::of_inbox(self.eyes.inbox(), &name, look));
+            Change::Settled(name, look, since) => {
+                tracing::debug!(input = shown(&name), bytes = look.bytes, "settled");
+                let job = Arc::new(Job::of_inbox(self.eyes.inbox(), &name, look, since));
                 self.jobs.insert(name, job.clone());
                 self.conveyor.submit(job);
             }
             Change::Withdrawn(name) => {
                 if let Some(job) = self.jobs.remove(&name) {
-                    tracing::info!(input = %name.display(), "changed or removed: the job is cancelled");
+                    tracing::info!(input = shown(&name), "changed or removed: the job is cancelled");
                     job.cancel();
                 }
             }
@@ -154,26 +166,31 @@ impl<'a> Daemon<'a> {
     }
 
     fn ended(&mut self, Ended { job, end }: Ended) {
-        if let End::Done(done) | End::Unchained(done, _) = &end
+        if let End::Done(done) | End::Later(done, _) | End::Unchained(done, _) = &end
             && !done.up_to_date
         {
             self.status.ended.count(done.report.status);
         } else if matches!(end, End::Lost) {
-            tracing::error!(input = %job.name.display(), "a stage broke down: that is a fault of planish; please report it");
+            tracing::error!(
+                input = shown(&job.name),
+                "a stage broke down: that is a fault of planish; please report it"
+            );
         }
         // A withdrawn job says nothing about the file that has its name now.
         if self.jobs.get(&job.name).is_some_and(|current| Arc::ptr_eq(current, &job)) {
             self.jobs.remove(&job.name);
-            let look = job.look.unwrap_or_else(|| unreachable!("jobs of an inbox have one"));
+            let Some(look) = job.look else { return };
             self.eyes.look_beside(&job.name, job.beside());
             match end {
                 End::Done(_) => self.inbox.done(&job.name, &look),
+                End::Later(_, then) => self.inbox.again(&job.name, &look, then),
                 // What it waits for is part of what is seen of it now.
                 End::Waiting(reason) => {
-                    tracing::info!(input = %job.name.display(), "waits: {}", reason.message);
+                    tracing::info!(input = shown(&job.name), "waits: {}", reason.message);
                     self.inbox.done(&job.name, &look);
                 }
                 End::Changed => self.inbox.again(&job.name, &look, Instant::now() + Duration::from_secs(1)),
+                End::Unwritten(error) if error.is_lasting() => self.inbox.done(&job.name, &look),
                 End::Unwanted | End::Unwritten(_) | End::Unchained(..) | End::Lost => {
                     self.inbox.again(&job.name, &look, Instant::now() + AGAIN);
                 }

@@ -28,8 +28,8 @@ pub struct Seen {
 /// What is to be done.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// A file has settled: it becomes a job.
-    Settled(PathBuf, Look),
+    /// A file has settled: it becomes a job. It is as it is since then.
+    Settled(PathBuf, Look, Instant),
     /// The job of a file has lost its sense: the file changed, or is gone.
     Withdrawn(PathBuf),
 }
@@ -43,6 +43,7 @@ pub struct Inbox {
 #[derive(Debug)]
 struct File {
     seen: Seen,
+    since: Instant,
     state: State,
 }
 
@@ -68,7 +69,7 @@ impl Inbox {
             there
         });
         for (name, seen) in listing {
-            let changing = || File { seen: seen.clone(), state: State::Changing(now) };
+            let changing = || File { seen: seen.clone(), since: now, state: State::Changing(now) };
             let file = self.files.entry(name.clone()).or_insert_with(changing);
             if file.seen != *seen {
                 if file.state == State::Submitted {
@@ -79,7 +80,7 @@ impl Inbox {
                 && now.saturating_duration_since(since) >= SETTLE
             {
                 file.state = State::Submitted;
-                changes.push(Change::Settled(name.clone(), seen.look));
+                changes.push(Change::Settled(name.clone(), seen.look, file.since));
             }
         }
         changes
@@ -133,7 +134,7 @@ mod tests {
 
     fn settled(changes: &[Change]) -> Vec<&str> {
         let name = |c: &Change| match c {
-            Change::Settled(name, _) => Some(name.to_str().expect("UTF-8").to_owned().leak() as &str),
+            Change::Settled(name, ..) => Some(name.to_str().expect("UTF-8").to_owned().leak() as &str),
             Change::Withdrawn(_) => None,
         };
         changes.iter().filter_map(name).collect()

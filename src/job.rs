@@ -7,6 +7,7 @@ use crate::report::Report;
 use parking_lot::Mutex;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 /// An input with the name of its result.
 #[derive(Debug)]
@@ -17,8 +18,10 @@ pub struct Job {
     pub name: PathBuf,
     /// Its size as it was seen, for the order among jobs.
     pub bytes: u64,
-    /// What the file must look like, where it may change at any moment.
+    /// What the file must look like; nothing where it could not be looked at.
     pub look: Option<Look>,
+    /// Since when it looks like that, where it lies in an inbox.
+    pub since: Option<Instant>,
     unwanted: AtomicBool,
     beside: Mutex<Vec<String>>,
 }
@@ -74,6 +77,8 @@ impl From<Reason> for Stopped {
 pub enum End {
     /// Its result stands in the output folder.
     Done(Done),
+    /// Its result stands, but its input is to be put away, and it is too early for that: not before then.
+    Later(Done, Instant),
     /// It was no longer wanted: nothing was published.
     Unwanted,
     /// The file is not what was seen, or gone: nothing was published.
@@ -100,19 +105,19 @@ pub struct Done {
 impl Job {
     /// The job for a file whose result goes to `name`.
     pub fn new(path: PathBuf, name: PathBuf, bytes: u64) -> Self {
-        Self { path, name, bytes, look: None, unwanted: AtomicBool::new(false), beside: Mutex::default() }
+        Self { path, name, bytes, look: None, since: None, unwanted: AtomicBool::new(false), beside: Mutex::default() }
     }
 
     /// The job for a file that is named: its result has its name.
     pub fn of_file(path: PathBuf) -> Self {
         let name = path.file_name().map(PathBuf::from).unwrap_or_default();
-        let bytes = std::fs::metadata(&path).map_or(0, |m| m.len());
-        Self::new(path, name, bytes)
+        let look = Look::at(&path).ok().flatten();
+        Self { look, ..Self::new(path, name, look.map_or(0, |look| look.bytes)) }
     }
 
-    /// The job for a file that was seen in the folder `inbox` under the relative path `name`.
-    pub fn of_inbox(inbox: &Path, name: &Path, look: Look) -> Self {
-        Self { look: Some(look), ..Self::new(inbox.join(name), name.to_owned(), look.bytes) }
+    /// The job for a file that was seen in the folder `inbox` under the relative path `name`, and has not changed `since`.
+    pub fn of_inbox(inbox: &Path, name: &Path, look: Look, since: Instant) -> Self {
+        Self { look: Some(look), since: Some(since), ..Self::new(inbox.join(name), name.to_owned(), look.bytes) }
     }
 
     /// Nobody wants the result any more: work ends at the next safe point, and nothing is published.

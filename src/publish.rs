@@ -53,6 +53,13 @@ pub enum PublishError {
     Nested(PathBuf),
 }
 
+impl PublishError {
+    /// Whether it stays as long as nobody changes something.
+    pub fn is_lasting(&self) -> bool {
+        matches!(self, Self::Foreign(_) | Self::Nested(_))
+    }
+}
+
 /// Attaches the path to an I/O error.
 fn at(path: &Path) -> impl FnOnce(io::Error) -> PublishError {
     let path = path.to_owned();
@@ -98,10 +105,8 @@ impl Publisher {
         files: &[(String, Vec<u8>)],
         wanted: impl Fn() -> bool,
     ) -> Result<bool, PublishError> {
+        self.admits(name)?;
         let target = self.target(name);
-        if !is_plain(name) || !may_be_replaced(&target) {
-            return Err(PublishError::Foreign(target));
-        }
         let parent = tempfile::tempdir_in(self.staging()).map_err(at(self.staging()))?;
         let fresh = parent.path().join(name.file_name().unwrap_or_default());
         fs::create_dir(&fresh).map_err(at(&fresh))?;
@@ -110,18 +115,31 @@ impl Publisher {
             write_synced(&path, bytes).map_err(at(&path))?;
         }
         sync_folder(&fresh).map_err(at(&fresh))?;
-        // One at a time, so that what is no longer wanted never takes the place of what came after it.
+        // One at a time, of all processes, so that what is no longer wanted never takes the place of what came after it.
         let open = self.open.lock();
+        let gate = self.out.join(STAGING).join(GATE);
+        let _alone = File::create(&gate).and_then(|f| f.lock().map(|()| f)).map_err(at(&gate))?;
         if !*open || !wanted() {
             return Ok(false);
         }
         // Writing took its time: somebody may have put something there.
-        if !may_be_replaced(&target) {
-            return Err(PublishError::Foreign(target));
-        }
+        self.admits(name)?;
         let folder = self.folder_for(name)?;
         put_in_place(&fresh, &target, parent.path()).map_err(at(&target))?;
         sync_folder(&folder).map_err(at(&folder)).map(|()| true)
+    }
+
+    /// Whether a result may be put in the place of `name`.
+    ///
+    /// # Errors
+    /// [`PublishError`]: what stands there.
+    pub fn admits(&self, name: &Path) -> Result<(), PublishError> {
+        let target = self.target(name);
+        let parents = name.ancestors().skip(1).filter(|p| !p.as_os_str().is_empty()).map(|p| self.out.join(p));
+        if let Some(result) = parents.into_iter().find(|p| p.join(crate::report::FILE).exists()) {
+            return Err(PublishError::Nested(result));
+        }
+        if is_plain(name) && may_be_replaced(&target) { Ok(()) } else { Err(PublishError::Foreign(target)) }
     }
 
     /// Nothing is put in place any more, and the staging folder goes. Whoever still writes to it hears of an error.
@@ -138,9 +156,6 @@ impl Publisher {
         for part in name.parent().into_iter().flat_map(Path::components) {
             let above = folder.clone();
             folder.push(part);
-            if folder.join(crate::report::FILE).exists() {
-                return Err(PublishError::Nested(folder));
-            }
             match fs::create_dir(&folder) {
                 Ok(()) => sync_folder(&above).map_err(at(&above))?,
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}

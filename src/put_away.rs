@@ -1,9 +1,10 @@
 //! What becomes of an input that is done with: it is moved to another folder, or deleted.
 //!
-//! The file is first moved into a hidden folder beside it, and looked at there: so what is put away is what was
-//! processed, even where something else takes its name at the same moment. What is left in such a folder when the
-//! program is killed goes back to its place at the next start ([`recover`]).
+//! The file is kept at its new place first, and then moved into a hidden folder beside it, and looked at there: so what
+//! is removed is what was processed, even where something else takes its name at the same moment. What is left in such a
+//! folder when the program is killed goes back to its place at the next start ([`recover`]).
 
+use crate::logging::shown;
 use crate::look::Look;
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -11,10 +12,13 @@ use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
 /// How the names of the hidden folders begin.
-const HOLDING: &str = ".planish-";
+const HOLDING: &str = ".planish-taken-";
 
 /// Numbers that are tried to find a free name.
 const MOST_COPIES: u32 = 10_000;
+
+/// Stems longer than this (bytes) are cut where a number is added; a character has at most four.
+const LONGEST_STEM: usize = 200;
 
 /// What is to become of the file.
 #[derive(Clone, Copy, Debug)]
@@ -38,40 +42,46 @@ pub struct PutAwayError {
 /// Puts the file at `path` away, if it still looks like `seen`. Links stay: what they point to is not ours.
 ///
 /// # Errors
-/// [`PutAwayError`]; then the file is where it was.
+/// [`PutAwayError`]; then the file is where it was, untouched where it has no place to go to.
 pub fn put_away(path: &Path, seen: &Look, way: Way) -> Result<(), PutAwayError> {
     let failed = |error| PutAwayError { path: path.to_owned(), error };
-    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return Ok(()) };
     if !fs::symlink_metadata(path).is_ok_and(|m| m.is_file() && Look::of(&m) == *seen) {
         return Ok(());
     }
-    // Not removed with what is in it when something goes wrong.
-    let holding = tempfile::Builder::new().prefix(HOLDING).tempdir_in(folder).map_err(failed)?.keep();
-    let held = holding.join(name);
-    let done = fs::rename(path, &held).and_then(|()| match Look::at(&held)? {
-        Some(found) if found.is_renamed(seen) => away(&held, way),
-        _ => Ok(()),
-    });
-    let back = give_back(&holding, folder);
-    done.and(back).map_err(failed)
-}
-
-fn away(held: &Path, way: Way) -> io::Result<()> {
-    match way {
-        Way::Nowhere => fs::remove_file(held),
-        Way::To(place) => move_to(held, place),
+    let kept = match way {
+        Way::Nowhere => None,
+        Way::To(place) => Some(keep_at(path, place).map_err(failed)?),
+    };
+    let is_gone = take(path, seen).map_err(failed)?;
+    match kept.filter(|_| !is_gone) {
+        // What was kept is not what was processed: that is still in the inbox.
+        Some(kept) => fs::remove_file(kept).map_err(failed),
+        None => Ok(()),
     }
 }
 
-/// Moves a file to `place`, or to the first place like it that is free.
-fn move_to(file: &Path, place: &Path) -> io::Result<()> {
+/// Removes the file at `path`, if it is the one that was seen; whether it was.
+fn take(path: &Path, seen: &Look) -> io::Result<bool> {
+    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return Ok(false) };
+    // Not removed with what is in it when something goes wrong.
+    let holding = tempfile::Builder::new().prefix(HOLDING).tempdir_in(folder)?.keep();
+    let held = holding.join(name);
+    let taken = fs::rename(path, &held).and_then(|()| {
+        let is_it = Look::at(&held)?.is_some_and(|found| found.is_renamed(seen));
+        if is_it { fs::remove_file(&held).map(|()| true) } else { Ok(false) }
+    });
+    give_back(&holding, folder).and(taken)
+}
+
+/// Keeps a file at `place`, or at the first place like it that is free; where that is.
+fn keep_at(file: &Path, place: &Path) -> io::Result<PathBuf> {
     let folder = place.parent().unwrap_or(place);
     fs::create_dir_all(folder)?;
     for copy in 1..MOST_COPIES {
         let place = if copy == 1 { place.to_owned() } else { numbered(place, copy) };
         match put_in_free_place(file, &place, folder) {
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
-            ended => return ended.and_then(|()| fs::remove_file(file)),
+            ended => return ended.map(|()| place),
         }
     }
     Err(io::Error::new(ErrorKind::AlreadyExists, format!("{} and {MOST_COPIES} numbered names exist", place.display())))
@@ -96,9 +106,12 @@ fn put_in_free_place(file: &Path, place: &Path, folder: &Path) -> io::Result<()>
     }
 }
 
-/// `part.stl` becomes `part.2.stl`.
+/// `part.stl` becomes `part.2.stl`; a name too long for that is cut.
 fn numbered(place: &Path, number: u32) -> PathBuf {
     let mut name = place.file_stem().unwrap_or_default().to_owned();
+    if name.len() > LONGEST_STEM {
+        name = name.to_string_lossy().chars().take(LONGEST_STEM / 4).collect::<String>().into();
+    }
     name.push(format!(".{number}"));
     if let Some(extension) = place.extension() {
         name.push(".");
@@ -120,19 +133,19 @@ fn give_back(holding: &Path, folder: &Path) -> io::Result<()> {
     fs::remove_dir(holding)
 }
 
-/// Gives back what was being put away when the program was killed, in all folders of `inbox`.
-///
-/// # Errors
-/// The first folder that cannot be cleared.
-pub fn recover(inbox: &Path) -> io::Result<()> {
+/// Gives back what was being put away when the program was killed, in `inbox` and, if asked, in its sub-folders. What
+/// cannot be given back is told.
+pub fn recover(inbox: &Path, recursive: bool) {
+    let depth = if recursive { usize::MAX } else { 1 };
     let is_holding =
         |e: &walkdir::DirEntry| e.file_type().is_dir() && e.file_name().to_string_lossy().starts_with(HOLDING);
-    let all = WalkDir::new(inbox).min_depth(1).into_iter().filter_map(Result::ok).filter(is_holding);
+    let all = WalkDir::new(inbox).min_depth(1).max_depth(depth).into_iter().filter_map(Result::ok).filter(is_holding);
     for holding in all {
         let path = holding.path();
-        path.parent().map_or(Ok(()), |folder| give_back(path, folder))?;
+        if let Err(error) = path.parent().map_or(Ok(()), |folder| give_back(path, folder)) {
+            tracing::warn!(folder = shown(path), "cannot give back what was being put away: {error}; look into it");
+        }
     }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -212,24 +225,38 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_cannot_be_moved_goes_back() {
+    fn long_names_are_cut_where_a_number_is_added() {
+        let place = Place::new();
+        let name = format!("{}.stl", "n".repeat(251));
+        for text in ["one", "two"] {
+            let seen = place.write(&name, text);
+            put_away(&place.path(&name), &seen, Way::To(&place.path("done").join(&name))).expect("moved");
+        }
+        assert_eq!(place.all().len(), 2);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_moved_stays_untouched() {
         let place = Place::new();
         let seen = place.write("a.stl", "one");
         place.write("done", "a file where a folder should be");
         let failed = put_away(&place.path("a.stl"), &seen, Way::To(&place.path("done/a.stl"))).expect_err("no folder");
         assert!(failed.to_string().contains("a.stl"));
         assert_eq!(place.all(), ["a.stl", "done"]);
+        assert_eq!(Look::at(&place.path("a.stl")).expect("there"), Some(seen), "nothing to be seen of the attempt");
     }
 
     #[test]
     fn what_a_killed_program_held_comes_back_unless_something_newer_is_there() {
         let place = Place::new();
-        for (holding, name) in [("sub/.planish-1", "a.stl"), ("sub/.planish-2", "b.stl")] {
+        for (holding, name) in [("sub/.planish-taken-1", "a.stl"), ("sub/.planish-taken-2", "b.stl")] {
             fs::create_dir_all(place.path(holding)).expect("made");
             place.write(&format!("{holding}/{name}"), "held");
         }
         place.write("sub/b.stl", "newer");
-        recover(place.folder.path()).expect("recovered");
+        recover(place.folder.path(), false);
+        assert!(!place.path("sub/a.stl").exists(), "not asked for");
+        recover(place.folder.path(), true);
         assert_eq!(place.all(), ["sub", "sub/a.stl", "sub/b.stl"]);
         assert_eq!(fs::read_to_string(place.path("sub/a.stl")).expect("there"), "held");
         assert_eq!(fs::read_to_string(place.path("sub/b.stl")).expect("there"), "newer");

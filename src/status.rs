@@ -4,6 +4,7 @@
 //! told by its lock on `OUT/.planish/watch.lock`, which the system takes back even where the daemon was killed.
 
 use crate::conveyor::board::Running;
+use crate::look::Identity;
 use crate::outcome::{Code, Status as Outcome};
 use crate::publish::STAGING;
 use serde::{Deserialize, Serialize};
@@ -135,7 +136,7 @@ fn of_process(pid: &Option<u32>) -> String {
 #[derive(Debug)]
 pub struct Lock {
     status: PathBuf,
-    _lock: File,
+    lock: File,
 }
 
 impl Lock {
@@ -148,12 +149,18 @@ impl Lock {
         let failed = |error| LockError::Io { path: path.clone(), error };
         let lock = File::options().create(true).append(true).open(&path).map_err(failed)?;
         match try_lock(&lock) {
-            Ok(()) => Ok(Self { status: out.join(STAGING).join(STATUS), _lock: lock }),
+            Ok(()) => Ok(Self { status: out.join(STAGING).join(STATUS), lock }),
             Err(TryLockError::WouldBlock) => {
                 Err(LockError::Busy { out: out.to_owned(), pid: told(out).map(|status| status.pid) })
             }
             Err(TryLockError::Error(error)) => Err(failed(error)),
         }
+    }
+
+    /// Whether the lock is still that of the output folder: somebody may have removed or replaced the folder.
+    pub fn is_held(&self) -> bool {
+        let there = fs::metadata(self.status.with_file_name(LOCK_FILE)).map(|m| Identity::of(&m));
+        there.is_ok_and(|there| self.lock.metadata().is_ok_and(|held| Identity::of(&held) == there))
     }
 
     /// Tells what the daemon does.
@@ -208,7 +215,7 @@ mod tests {
         fs::create_dir(&staging).expect("made");
         assert!(!is_running(out.path()));
         let daemon = Lock::take(out.path()).expect("free");
-        assert!(is_running(out.path()));
+        assert!(is_running(out.path()) && daemon.is_held());
         let status = Status { pid: 42, waiting: 3, ..Status::default() };
         daemon.tell(&status, &staging).expect("written");
         assert_eq!(told(out.path()), Some(status));

@@ -11,6 +11,7 @@
 use crate::conveyor::{Conveyor, Ended};
 use crate::formats::{self, Kind};
 use crate::inbox::{Listing, Seen};
+use crate::logging::shown;
 use crate::look::{Identity, Look};
 use crossbeam_channel::{Receiver, Sender, after, bounded, select};
 use notify::event::{AccessKind, AccessMode, EventKind};
@@ -18,7 +19,7 @@ use notify::{RecommendedWatcher, RecursiveMode, Watcher};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 use walkdir::{DirEntry, WalkDir};
 
 /// The folder is scanned this often, hints or not.
@@ -79,7 +80,7 @@ pub struct Eyes {
     _tell: Sender<()>,
     watcher: Option<RecommendedWatcher>,
     /// The folder that is watched: another one may take its name.
-    watched: Option<Identity>,
+    watched: Option<(Identity, Option<SystemTime>)>,
     is_missing: bool,
     passed_over: BTreeSet<PathBuf>,
     /// Files that ask for others beside them, with the names of these.
@@ -145,13 +146,13 @@ impl Eyes {
     pub fn look(&mut self) -> Option<Listing> {
         let began = Instant::now();
         let seen = std::fs::metadata(&self.inbox).and_then(|metadata| {
-            self.watch_again(Identity::of(&metadata));
+            self.watch_again((Identity::of(&metadata), metadata.created().ok()));
             self.scan()
         });
         let listing = match seen {
             Ok(listing) => {
                 if std::mem::take(&mut self.is_missing) {
-                    tracing::info!(inbox = %self.inbox.display(), "the inbox is back");
+                    tracing::info!(inbox = shown(&self.inbox), "the inbox is back");
                 }
                 Some(listing)
             }
@@ -164,7 +165,10 @@ impl Eyes {
 
     fn not_there(&mut self, error: &io::Error) -> Option<Listing> {
         if !std::mem::replace(&mut self.is_missing, true) {
-            tracing::warn!(inbox = %self.inbox.display(), "cannot see the inbox: {error}; make it again, mount it, or let it be read");
+            tracing::warn!(
+                inbox = shown(&self.inbox),
+                "cannot see the inbox: {error}; make it again, mount it, or let it be read"
+            );
         }
         let is_gone = error.kind() == ErrorKind::NotFound;
         if is_gone {
@@ -174,7 +178,7 @@ impl Eyes {
     }
 
     /// Asks for hints of the folder that has the name of the inbox now.
-    fn watch_again(&mut self, identity: Identity) {
+    fn watch_again(&mut self, identity: (Identity, Option<SystemTime>)) {
         let Some(watcher) = &mut self.watcher else { return };
         if self.watched == Some(identity) {
             return;
@@ -228,7 +232,10 @@ impl Eyes {
             Look::at(entry.path()).ok()??
         } else {
             if !kind.is_dir() && self.passed_over.insert(name.to_owned()) {
-                tracing::warn!(input = %name.display(), "passed over: no regular file of the inbox; copy the file itself");
+                tracing::warn!(
+                    input = shown(name.as_ref()),
+                    "passed over: no regular file of the inbox; copy the file itself"
+                );
             }
             return None;
         };

@@ -1,22 +1,35 @@
 //! The memory budget: what inputs on their way and factorisations may take together.
 //!
-//! Two accounts share one limit. An input takes the memory of its data before it is read and holds it until it has
-//! ended; a chart takes that of a factorisation before it begins. Neither waits for ever: where its own account is
-//! empty, a request is granted whatever its size, so that an input larger than the budget is done too, alone; and who
-//! holds a factorisation waits for nothing but its turn to compute. Requests of one account are granted in the order of
-//! their turns.
+//! Several accounts share one limit. An input takes the memory of its data before it is read and holds it until its
+//! result stands; a chart takes that of a factorisation before it begins. Neither waits for ever: where its own account
+//! is empty, a request is granted whatever its size, so that an input larger than the budget is done too; and who holds
+//! a factorisation waits for nothing but its turn to compute. Inputs of each belt have an account of their own, so that
+//! a large one does not keep small ones from being read; what they take beyond the limit is little. Requests of one
+//! account are granted in the order of their turns.
 
-use super::queue::Turn;
+use super::queue::{BELTS, Turn};
 use parking_lot::{Condvar, Mutex};
 use std::collections::BTreeSet;
 
 /// Who asks for memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Account {
-    /// The data of an input.
-    Input,
+    /// The data of an input of this belt.
+    Input(usize),
     /// A factorisation.
     Factor,
+}
+
+/// How many accounts there are.
+const ACCOUNTS: usize = BELTS + 1;
+
+impl Account {
+    fn index(self) -> usize {
+        match self {
+            Self::Input(belt) => belt.min(BELTS - 1),
+            Self::Factor => BELTS,
+        }
+    }
 }
 
 /// Memory that may be taken.
@@ -29,9 +42,9 @@ pub struct Budget {
 
 #[derive(Debug, Default)]
 struct State {
-    taken: [u64; 2],
+    taken: [u64; ACCOUNTS],
     tickets: u64,
-    waiting: [BTreeSet<(Turn, u64)>; 2],
+    waiting: [BTreeSet<(Turn, u64)>; ACCOUNTS],
 }
 
 impl Budget {
@@ -43,16 +56,16 @@ impl Budget {
     /// Takes `bytes` if they are there and nobody waits for them.
     pub fn try_take(&self, account: Account, bytes: u64) -> bool {
         let mut state = self.state.lock();
-        let granted = state.waiting[account as usize].is_empty() && self.fits(&state, account, bytes);
+        let granted = state.waiting[account.index()].is_empty() && self.fits(&state, account, bytes);
         if granted {
-            state.taken[account as usize] += bytes;
+            state.taken[account.index()] += bytes;
         }
         granted
     }
 
     /// Takes `bytes` whether they are there or not: for what is cancelled, and will give them back at once.
     pub fn overdraw(&self, account: Account, bytes: u64) {
-        self.state.lock().taken[account as usize] += bytes;
+        self.state.lock().taken[account.index()] += bytes;
     }
 
     /// Waits until `bytes` are there, and takes them.
@@ -60,24 +73,24 @@ impl Budget {
         let mut state = self.state.lock();
         state.tickets += 1;
         let me = (turn, state.tickets);
-        state.waiting[account as usize].insert(me);
-        while state.waiting[account as usize].first() != Some(&me) || !self.fits(&state, account, bytes) {
+        state.waiting[account.index()].insert(me);
+        while state.waiting[account.index()].first() != Some(&me) || !self.fits(&state, account, bytes) {
             self.given_back.wait(&mut state);
         }
-        state.waiting[account as usize].remove(&me);
-        state.taken[account as usize] += bytes;
+        state.waiting[account.index()].remove(&me);
+        state.taken[account.index()] += bytes;
         self.given_back.notify_all();
     }
 
     /// Gives `bytes` back.
     pub fn give_back(&self, account: Account, bytes: u64) {
-        self.state.lock().taken[account as usize] -= bytes;
+        self.state.lock().taken[account.index()] -= bytes;
         self.given_back.notify_all();
     }
 
     fn fits(&self, state: &State, account: Account, bytes: u64) -> bool {
-        let taken = state.taken[0].saturating_add(state.taken[1]);
-        state.taken[account as usize] == 0 || taken.saturating_add(bytes) <= self.limit
+        let taken = state.taken.iter().fold(0, |sum: u64, taken| sum.saturating_add(*taken));
+        state.taken[account.index()] == 0 || taken.saturating_add(bytes) <= self.limit
     }
 }
 
@@ -103,26 +116,34 @@ mod tests {
                 });
             }
         });
-        assert_eq!(budget.state.lock().taken, [0, 0]);
+        assert_eq!(budget.state.lock().taken, [0; ACCOUNTS]);
     }
 
     #[test]
     fn a_factorisation_is_granted_beside_inputs_that_hold_all() {
         let budget = Budget::new(100);
-        budget.take(Account::Input, 400, 0);
-        assert!(!budget.try_take(Account::Input, 1));
+        budget.take(Account::Input(0), 400, 0);
+        assert!(!budget.try_take(Account::Input(0), 1));
         assert!(budget.try_take(Account::Factor, 50) && !budget.try_take(Account::Factor, 50));
-        budget.give_back(Account::Input, 400);
+        budget.give_back(Account::Input(0), 400);
         assert!(budget.try_take(Account::Factor, 50));
+    }
+
+    #[test]
+    fn small_inputs_are_read_beside_a_large_one_that_holds_all() {
+        let budget = Budget::new(100);
+        budget.take(Account::Input(2), 400, 0);
+        assert!(!budget.try_take(Account::Input(2), 1));
+        assert!(budget.try_take(Account::Input(0), 60) && !budget.try_take(Account::Input(0), 1));
     }
 
     #[test]
     fn an_input_that_claims_all_memory_there_is_does_no_harm() {
         let budget = Budget::new(100);
         budget.take(Account::Factor, 50, 0);
-        budget.take(Account::Input, u64::MAX, 0);
-        assert!(!budget.try_take(Account::Factor, 50) && !budget.try_take(Account::Input, 1));
-        budget.give_back(Account::Input, u64::MAX);
+        budget.take(Account::Input(0), u64::MAX, 0);
+        assert!(!budget.try_take(Account::Factor, 50) && !budget.try_take(Account::Input(0), 1));
+        budget.give_back(Account::Input(0), u64::MAX);
         assert!(budget.try_take(Account::Factor, 50));
     }
 }

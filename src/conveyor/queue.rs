@@ -47,7 +47,7 @@ struct State {
 }
 
 /// The belt for an input of `bytes`.
-fn belt(bytes: u64) -> usize {
+pub fn belt(bytes: u64) -> usize {
     CLASSES.iter().take_while(|limit| bytes >= **limit).count()
 }
 

@@ -2,9 +2,10 @@
 
 use super::board::Board;
 use super::budget::{Account, Budget};
-use super::queue::{Queue, Turn, Waiting};
+use super::queue::{Queue, Turn, Waiting, belt};
 use super::turnstile::Turnstile;
 use crate::job::{End, Job, Stage, Stopped};
+use crate::logging::shown;
 use crate::publish::Publisher;
 use crate::settings::Settings;
 use crate::stages::guard;
@@ -59,8 +60,8 @@ impl Travel {
     pub fn begin(shared: &Arc<Shared>, Waiting { job, turn }: Waiting) -> Arc<Self> {
         let number = shared.board.add(&job);
         let memory = if job.is_wanted() { job.bytes.saturating_mul(MEMORY_PER_BYTE) } else { 0 };
-        shared.budget.take(Account::Input, memory, turn);
-        let span = tracing::info_span!("job", input = %job.name.display());
+        shared.budget.take(Account::Input(belt(job.bytes)), memory, turn);
+        let span = tracing::info_span!("job", input = shown(&job.name));
         span.in_scope(|| tracing::info!("begins"));
         let (memory, seconds, end) = (memory.into(), Mutex::default(), Mutex::new(None));
         Arc::new(Self { shared: shared.clone(), job, number, turn, memory, span, seconds, end })
@@ -96,7 +97,7 @@ impl Travel {
 
     /// The data of the input is gone: others may take its memory.
     pub fn give_memory_back(&self) {
-        self.shared.budget.give_back(Account::Input, self.memory.swap(0, Ordering::Relaxed));
+        self.shared.budget.give_back(Account::Input(belt(self.job.bytes)), self.memory.swap(0, Ordering::Relaxed));
     }
 
     /// How the job ended.
@@ -209,7 +210,7 @@ pub(super) mod tests {
         assert!(matches!(ended.try_recv().expect("told").end, End::Lost));
         assert!(ended.try_recv().is_err() && shared.board.running().is_empty());
         shared.budget.give_back(Account::Factor, 1 << 19);
-        assert!(shared.budget.try_take(Account::Input, 1 << 20), "the memory for its data, too");
+        assert!(shared.budget.try_take(Account::Input(0), 1 << 20), "the memory for its data, too");
     }
 
     #[test]

@@ -7,7 +7,11 @@ pub mod status;
 pub mod watch;
 
 use std::io::Write;
-use std::path::Path;
+
+/// What is said where the stages cannot be started.
+fn no_threads(error: &std::io::Error) -> String {
+    format!("cannot start the threads of the stages: {error}; give a lower --jobs, or raise the limit of processes")
+}
 
 /// What is said where results have no place.
 const NO_OUT: &str = "no output folder: give --out DIR (or out = \"DIR\" in planish.toml)";
@@ -23,10 +27,7 @@ pub fn complain(line: &str) {
     let _ = writeln!(std::io::stderr(), "planish: {line}");
 }
 
-/// A path as it may be shown: on one line, whatever its bytes.
-fn shown(path: &Path) -> String {
-    path.to_string_lossy().escape_debug().to_string()
-}
+use crate::logging::shown;
 
 /// Every verb says how it ended: the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -31,7 +31,7 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     inputs::refuse_inside(&jobs, out)?;
     let publisher = Arc::new(Publisher::open(out)?);
     let stop = signals::listen()?;
-    let conveyor = Conveyor::start(settings, publisher.clone())?;
+    let conveyor = Conveyor::start(settings, publisher.clone()).map_err(|e| super::no_threads(&e))?;
     let jobs: Vec<Arc<Job>> = jobs.into_iter().map(Arc::new).collect();
     jobs.iter().for_each(|job| conveyor.submit(job.clone()));
     conveyor.close();
@@ -106,7 +106,7 @@ fn table(rows: &[Row]) -> Table {
     for (job, end) in rows {
         let name = shown(&job.name);
         table.add_row(match end {
-            End::Done(done) | End::Unchained(done, _) => cells(name, done),
+            End::Done(done) | End::Later(done, _) | End::Unchained(done, _) => cells(name, done),
             End::Unwanted => vec![name, "interrupted".to_owned()],
             End::Changed | End::Waiting(_) | End::Unwritten(_) | End::Lost => vec![name, "not written".to_owned()],
         });
@@ -149,6 +149,6 @@ fn tell_trouble(job: &Job, end: &End) {
             let place = reason.place.as_ref().map_or(String::new(), |p| format!(" ({p})"));
             complain(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
         }
-        End::Done(_) | End::Unwanted => {}
+        End::Done(_) | End::Later(..) | End::Unwanted => {}
     }
 }

@@ -22,11 +22,11 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
     places::refuse_nested(&places(inbox, out, settings))?;
     let publisher = Arc::new(Publisher::open(out)?);
     let lock = Lock::take(out)?;
-    put_away::recover(inbox)?;
+    put_away::recover(inbox, settings.recursive);
     let stop = signals::listen()?;
-    let conveyor = Conveyor::start(settings, publisher.clone())?;
+    let conveyor = Conveyor::start(settings, publisher.clone()).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = %inbox.display(), out = %out.display(), "watches");
-    let ended = Daemon::new(inbox, settings, &conveyor, (&lock, publisher.staging())).run(&stop);
+    let ended = Daemon::new(inbox, settings, &conveyor, (&lock, publisher.staging())).run(&stop)?;
     // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more.
     publisher.close();
     tracing::info!(certified = ended.certified, refused = ended.refused, failed = ended.failed, "stopped");

@@ -6,6 +6,7 @@ use crate::support::{fixture, planish};
 use planish::outcome::Status;
 use serde_json::Value;
 use std::fs;
+use std::io::Write;
 
 fn account(w: &Watched, name: &str) -> Option<Value> {
     serde_json::from_slice(&fs::read(w.out.of(name).join("hooks.json")).ok()?).ok()
@@ -118,4 +119,21 @@ fn inputs_are_put_away_when_they_are_done_with_and_only_then() {
     assert_eq!(fs::read(done.path().join("a.stl")).expect("moved"), disk(4, 0.0));
     assert_eq!(fs::read(done.path().join("sub/b.stl")).expect("moved"), disk(4, 0.0));
     assert_eq!(names(done.path()).len(), 2);
+}
+
+/// Half of a file is a surface, too; but the file is not put away before it has been quiet for long.
+#[test]
+fn what_is_written_after_a_pause_is_not_lost_with_the_input() {
+    let mut w = Watched::new(&["--inputs", "delete"]);
+    w.start();
+    let [first, second] = ["v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", "v 0 1 0\nf 1 3 4\n"];
+    let mut file = fs::File::create(w.inbox().join("a.obj")).expect("made");
+    file.write_all(first.as_bytes()).expect("written");
+    w.wait_for(&[("a.obj", first.as_bytes())]);
+    file.write_all(second.as_bytes()).expect("written");
+    drop(file);
+    w.wait_for(&[("a.obj", [first, second].concat().as_bytes())]);
+    w.wait_until("it is put away", |w| names(&w.inbox()).is_empty());
+    assert_eq!(w.out.report("a.obj").surface.expect("a surface").repaired.counts.triangles, 2);
+    w.stop();
 }

@@ -76,3 +76,30 @@ fn a_run_that_is_interrupted_publishes_nothing_half() {
     assert_eq!(super::names(w.out.path()).len(), 2, "the other result is not there");
     assert_eq!(super::names(&w.out.path().join(".planish")).len(), 1, "nor anything on its way");
 }
+
+/// A run does not put the result of what it has read in the place of that of newer content.
+#[test]
+fn a_run_whose_input_changes_meanwhile_publishes_nothing() {
+    let w = Watched::new(&[]);
+    let path = w.inbox().join("a.stl");
+    std::fs::write(&path, disk(150, 0.0)).expect("written");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_planish"));
+    command.args(["run", "-v"]).arg(&path).arg("--out").arg(w.out.path());
+    let log = std::fs::File::create(w.beside("log")).expect("a log");
+    let mut run = command.stderr(log).stdout(std::process::Stdio::null()).spawn().expect("starts");
+    w.wait_until("it has begun", |w| w.log().contains("begins"));
+    std::thread::sleep(Duration::from_millis(500));
+    w.drop_in("a.stl", &disk(4, 1.0));
+    assert_eq!(run.wait().expect("ends").code(), Some(1));
+    assert!(w.log().contains("it changed while") && !w.out.of("a.stl").exists(), "{}", w.log());
+}
+
+#[test]
+fn an_output_folder_that_is_removed_ends_the_daemon() {
+    let mut w = Watched::new(&[]);
+    w.start();
+    w.wait_until("it tells", |w| w.status()["pid"] == w.pid());
+    std::fs::remove_dir_all(w.out.path()).expect("removed");
+    assert_eq!(w.wait().code(), Some(2));
+    assert!(w.log().contains("the output folder was removed"), "{}", w.log());
+}
