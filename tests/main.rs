@@ -8,6 +8,7 @@ mod fixtures;
 mod interop;
 mod invariants;
 mod legality;
+mod manifest;
 mod packaging;
 mod run;
 mod support;

@@ -55,7 +55,7 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { file: 16 << 30, elements: TriangleSoup::MAX_TRIANGLES as u64, expansion: 100, depth: 256 }
+        Self { file: 2 << 30, elements: TriangleSoup::MAX_TRIANGLES as u64, expansion: 100, depth: 256 }
     }
 }
 

@@ -3,6 +3,7 @@
 use super::{Watched, disk, names, write_slowly};
 use crate::support::{fixture, planish};
 use planish::outcome::Status;
+use rustix::process::Signal;
 use std::fs;
 use std::time::Duration;
 
@@ -230,4 +231,24 @@ fn a_document_waits_for_the_data_that_it_names_and_follows_their_changes() {
     w.wait_until("it is up to date", |w| w.logged("a.gltf", "is up to date") > 0);
     w.stop();
     w.assert_tidy(&["a.gltf"]);
+}
+
+/// The system's queue of events overflows while the daemon cannot listen.
+#[test]
+fn a_flood_of_events_hides_no_file() {
+    let mut w = Watched::new(&["-q"]);
+    w.start();
+    w.wait_until("it tells", |w| w.status()["pid"] == w.pid());
+    w.signal(Signal::STOP);
+    for i in 0..20_000 {
+        let path = w.inbox().join(format!("{i}.tmp"));
+        fs::write(&path, "").expect("written");
+        fs::remove_file(path).expect("removed");
+    }
+    let bytes = disk(4, 0.0);
+    w.drop_in("a.stl", &bytes);
+    w.signal(Signal::CONT);
+    w.wait_for(&[("a.stl", &bytes)]);
+    w.stop();
+    w.assert_tidy(&["a.stl"]);
 }

@@ -31,6 +31,7 @@ fn two_thousand_files_are_done_and_memory_stays_what_it_is() {
     let half = memory(w.pid());
     w.wait_until("all are done", |w| done(w) >= FILES);
     let end = memory(w.pid());
+    eprintln!("{half} KiB resident at half-way, {end} KiB at the end");
     assert!(end < 1.05 * half, "{half} KiB at half-way, {end} KiB at the end");
     w.stop();
     let names: Vec<String> = (0..FILES).map(name).collect();

@@ -15,7 +15,7 @@ pub struct Census {
     pub edges: usize,
     /// Parts connected through edges.
     pub components: usize,
-    /// Closed curves of boundary edges.
+    /// Closed curves of boundary edges; curves that meet at the end of a non-manifold edge are one.
     pub boundary_loops: usize,
     /// Euler number: vertices - edges + triangles.
     pub euler: i64,
@@ -25,7 +25,7 @@ pub struct Census {
     pub orientable: bool,
     /// Edges at which three or more triangles meet.
     pub nonmanifold_edges: usize,
-    /// Vertices at which several sheets touch.
+    /// Vertices at which several sheets touch that share no edge there.
     pub nonmanifold_vertices: usize,
     /// Edges whose two triangles disagree about the direction.
     pub inconsistent_edges: usize,
@@ -41,14 +41,17 @@ pub struct Umbrellas {
 }
 
 impl Umbrellas {
-    /// Groups the corners of `triangles`.
+    /// Groups the corners of `triangles`; edges of three or more of them part sheets.
     pub fn new(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Self {
+        Self::through(triangles, edges, 2)
+    }
+
+    /// Groups the corners of `triangles` through edges of at most so many of them.
+    fn through(triangles: &[[VertexId; 3]], edges: &EdgeTable, most: usize) -> Self {
         let mut sets = UnionFind::new(3 * triangles.len());
-        for (_, sides) in edges.iter() {
-            if let [g, h] = *sides {
-                for (a, b) in matching_corners(triangles, g, h) {
-                    sets.unite(a, b);
-                }
+        for (_, sides) in edges.iter().filter(|(_, sides)| sides.len() <= most) {
+            for (a, b) in sides.windows(2).flat_map(|pair| matching_corners(triangles, pair[0], pair[1])) {
+                sets.unite(a, b);
             }
         }
         let (of_corner, count) = sets.labels();
@@ -124,7 +127,8 @@ pub(crate) fn orientation(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Ori
 impl Census {
     /// Counts everything about `triangles`, whose corners are distinct.
     pub fn new(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Self {
-        let umbrellas = Umbrellas::new(triangles, edges);
+        // What touches along a non-manifold edge touches in its ends, too: that is no defect of its own.
+        let umbrellas = Umbrellas::through(triangles, edges, usize::MAX);
         let (vertices, nonmanifold_vertices) = count_vertices(&umbrellas.vertices(triangles));
         let orientable = orientation(triangles, edges).orientable.iter().all(|o| *o);
         let nonmanifold_edges = edges.iter().filter(|(_, s)| s.len() > 2).count();
@@ -222,6 +226,7 @@ mod tests {
     fn a_book_of_three_pages_is_not_manifold() {
         let book = census(&[[0, 1, 2], [1, 0, 3], [0, 1, 4]]);
         assert_eq!((book.nonmanifold_edges, book.genus, book.components), (1, None, 1));
+        assert_eq!((book.nonmanifold_vertices, book.boundary_loops), (0, 1));
     }
 
     #[test]
