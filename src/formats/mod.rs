@@ -6,6 +6,7 @@ pub mod gmsh;
 mod obj;
 mod polygon;
 mod stl;
+mod vtk;
 pub mod vtm;
 pub mod vtp;
 pub mod vtu;
@@ -24,6 +25,12 @@ pub enum Format {
     Obj,
     /// glTF 2.0, JSON or binary container.
     Gltf,
+    /// VTK legacy.
+    Vtk,
+    /// VTK XML, an unstructured grid.
+    Vtu,
+    /// VTK XML, polygons.
+    Vtp,
 }
 
 /// What the name of a file says about it.
@@ -40,7 +47,7 @@ pub enum Kind {
 }
 
 /// Extensions of meshes in formats that this version does not read.
-const OTHER_MESHES: [&str; 6] = ["ply", "vtk", "vtu", "vtp", "msh", "off"];
+const OTHER_MESHES: [&str; 3] = ["ply", "msh", "off"];
 
 /// Extensions of what lies beside meshes.
 const NO_MESHES: [&str; 13] =
@@ -55,6 +62,10 @@ pub fn kind(path: &Path) -> Kind {
         "stl" => Kind::Mesh(Format::Stl),
         "obj" => Kind::Mesh(Format::Obj),
         "gltf" | "glb" => Kind::Mesh(Format::Gltf),
+        "vtk" => Kind::Mesh(Format::Vtk),
+        // Files that name others are told apart by what they hold, and refused with the names of the right ones.
+        "vtu" | "pvtu" => Kind::Mesh(Format::Vtu),
+        "vtp" | "pvtp" | "vtm" => Kind::Mesh(Format::Vtp),
         e if OTHER_MESHES.contains(&e) => Kind::OtherMesh(extension),
         e if NO_MESHES.contains(&e) => Kind::NoMesh,
         _ => Kind::Unknown(extension),
@@ -76,6 +87,9 @@ pub enum ReadError {
     /// Not a glTF file.
     #[error(transparent)]
     Gltf(#[from] gltf::GltfError),
+    /// Not a VTK file, or none with a surface.
+    #[error(transparent)]
+    Vtk(#[from] vtk::VtkError),
     /// What was read makes no sense.
     #[error(transparent)]
     Soup(#[from] SoupError),
@@ -89,6 +103,7 @@ impl ReadError {
             Self::Stl(e) => (e.code(), e.place()),
             Self::Obj(e) => (e.code(), e.place()),
             Self::Gltf(e) => (e.code(), e.place()),
+            Self::Vtk(e) => (e.code(), e.place()),
             Self::Soup(e) => soup_reason(e),
         };
         Reason { code, message: self.to_string(), place }
@@ -117,6 +132,7 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
         Format::Stl => stl::read(bytes),
         Format::Obj => obj::read(bytes),
         Format::Gltf => gltf::read(source),
+        Format::Vtk | Format::Vtu | Format::Vtp => vtk::read(source),
     }
 }
 

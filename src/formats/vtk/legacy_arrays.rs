@@ -1,0 +1,252 @@
+//! The arrays of a legacy file: numbers in text, or big-endian.
+
+use super::error::{Place, VtkError, shown};
+use super::scalar::{Order, Scalar};
+use super::text::Text;
+use pipeline::space::Vec3;
+
+/// Corners of cells one after the other, and where each ends.
+type CornersAndEnds = (Vec<u32>, Vec<u32>);
+
+/// A legacy file, read from its front.
+pub(super) struct Arrays<'a> {
+    pub text: Text<'a>,
+    /// Whether arrays are binary.
+    pub binary: bool,
+}
+
+/// The type of an array that is passed over.
+enum Kind {
+    Number(Scalar),
+    /// Eight to a byte.
+    Bit,
+    /// Each after its length in binary files, on a line of its own in others.
+    String,
+    /// Always on a line of its own.
+    Variant,
+}
+
+impl<'a> Arrays<'a> {
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { text: Text { bytes, at: 0 }, binary: false }
+    }
+
+    /// Where the file is read. Binary arrays hold bytes that look like ends of lines.
+    pub fn place(&self) -> Place {
+        if self.binary { Place::Byte(self.text.at) } else { self.text.place() }
+    }
+
+    /// The next keyword, in upper case, after what is told about the array before it.
+    pub fn keyword(&mut self) -> Result<Option<Vec<u8>>, VtkError> {
+        while let Some(word) = self.text.word() {
+            let word = word.to_ascii_uppercase();
+            if word != b"METADATA" {
+                return Ok(Some(word));
+            }
+            // It ends with an empty line.
+            self.text.line();
+            while self.text.line().is_some_and(|line| !line.trim_ascii().is_empty()) {}
+        }
+        Ok(None)
+    }
+
+    /// The error that the file ends before this.
+    pub fn ends(&self, before: &str) -> VtkError {
+        self.syntax(format!("the file ends before {before}: it was cut off"))
+    }
+
+    /// The error that another keyword is expected here.
+    pub fn unexpected(&self, word: &[u8], expected: &str) -> VtkError {
+        self.syntax(format!("unexpected \"{}\" where {expected} may stand", shown(word)))
+    }
+
+    fn syntax(&self, problem: String) -> VtkError {
+        VtkError::Syntax { place: self.place(), problem }
+    }
+
+    /// A number of elements.
+    fn count(&mut self, what: &str) -> Result<u64, VtkError> {
+        let Some(word) = self.text.word() else { return Err(self.ends(&format!("the number of {what}"))) };
+        let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
+        number.ok_or_else(|| self.syntax(format!("\"{}\" is no number of {what}", shown(word))))
+    }
+
+    /// A type, and the rest of its line.
+    fn kind(&mut self, what: &str) -> Result<Kind, VtkError> {
+        let Some(word) = self.text.word() else { return Err(self.ends(&format!("the type of {what}"))) };
+        let kind = match word.to_ascii_lowercase().as_slice() {
+            b"bit" => Some(Kind::Bit),
+            b"string" | b"utf8_string" => Some(Kind::String),
+            b"variant" => Some(Kind::Variant),
+            other => Scalar::legacy(other).map(Kind::Number),
+        };
+        let kind = kind.ok_or_else(|| self.syntax(format!("\"{}\" is no type of {what}", shown(word))))?;
+        self.end_of_line();
+        Ok(kind)
+    }
+
+    fn number_kind(&mut self, what: &str) -> Result<Scalar, VtkError> {
+        match self.kind(what)? {
+            Kind::Number(scalar) => Ok(scalar),
+            _ => Err(self.syntax(format!("{what} are no numbers"))),
+        }
+    }
+
+    /// Binary numbers begin after the end of the line.
+    fn end_of_line(&mut self) {
+        if self.binary {
+            self.text.line();
+        }
+    }
+
+    /// The bytes of so many elements of a size.
+    fn bytes(&mut self, what: &str, count: u64, size: u64) -> Result<&'a [u8], VtkError> {
+        let rest = self.text.rest();
+        let there = rest.len() as u64 / size;
+        if count > there {
+            return Err(VtkError::Count { place: self.place(), what: what.to_owned(), declared: count, there });
+        }
+        let taken = &rest[..(count * size) as usize];
+        self.text.at += taken.len();
+        Ok(taken)
+    }
+
+    /// Points: their number, of at most `most`, type and coordinates.
+    pub fn points(&mut self, most: u64) -> Result<Vec<Vec3>, VtkError> {
+        let place = self.place();
+        let count = self.count("points")?;
+        let scalar = self.number_kind("coordinates")?;
+        if count > most {
+            return Err(VtkError::TooLarge { place, what: "points", declared: count, limit: most });
+        }
+        if !self.binary {
+            return self.text.points("POINTS", count);
+        }
+        let bytes = self.bytes("POINTS", count.saturating_mul(3), scalar.size())?;
+        Ok(scalar.points(bytes, Order::Big))
+    }
+
+    fn ids(&mut self, what: &str, count: u64, scalar: Scalar) -> Result<Vec<u32>, VtkError> {
+        if !self.binary {
+            return self.text.ids(what, count);
+        }
+        let start = self.text.at;
+        let bytes = self.bytes(what, count, scalar.size())?;
+        scalar.ids(bytes, Order::Big).map_err(|bad| {
+            let place = Place::Byte(start + bad.entry * scalar.size() as usize);
+            VtkError::Syntax { place, problem: format!("{what} hold the number {}, which is no id", bad.value) }
+        })
+    }
+
+    /// The types of cells: their number, and the type of each.
+    pub fn types(&mut self) -> Result<Vec<u8>, VtkError> {
+        let count = self.count("cells")?;
+        self.end_of_line();
+        let types = self.ids("CELL_TYPES", count, Scalar::I32)?;
+        // What does not fit is no type that VTK has; neither is 255.
+        Ok(types.into_iter().map(|t| u8::try_from(t).unwrap_or(u8::MAX)).collect())
+    }
+
+    /// Cells: the corners of one after the other, and where each ends.
+    pub fn cells(&mut self, section: &str) -> Result<CornersAndEnds, VtkError> {
+        let place = self.place();
+        let (count, size) = (self.count("cells")?, self.count("corners")?);
+        self.end_of_line();
+        if !self.binary {
+            self.text.blanks();
+        }
+        // From version 5 on. In the older layout the first number is a count of corners, never this word.
+        if self.text.rest().get(..7).is_some_and(|word| word.eq_ignore_ascii_case(b"OFFSETS")) {
+            return self.with_offsets(section, count, size);
+        }
+        let list = self.ids(section, size, Scalar::I32)?;
+        split(&list, count).ok_or_else(|| {
+            let problem = format!("{section}: {size} numbers are not those of {count} cells with the count of each");
+            VtkError::Syntax { place, problem }
+        })
+    }
+
+    /// Cells of the layout from version 5 on.
+    fn with_offsets(&mut self, section: &str, offsets: u64, corners: u64) -> Result<CornersAndEnds, VtkError> {
+        let starts = self.named("OFFSETS", section, offsets)?;
+        let corners = self.named("CONNECTIVITY", section, corners)?;
+        let ends = starts.get(1..).unwrap_or_default();
+        let last = ends.last().copied().unwrap_or_default() as usize;
+        if starts.first().is_some_and(|first| *first != 0) || last != corners.len() {
+            let problem =
+                format!("the offsets of {section} do not lead from 0 to {}, the number of corners", corners.len());
+            return Err(self.syntax(problem));
+        }
+        Ok((corners, ends.to_vec()))
+    }
+
+    fn named(&mut self, name: &str, section: &str, count: u64) -> Result<Vec<u32>, VtkError> {
+        match self.keyword()? {
+            Some(word) if word == name.as_bytes() => {}
+            Some(other) => return Err(self.unexpected(&other, name)),
+            None => return Err(self.ends(name)),
+        }
+        let what = format!("{name} of {section}");
+        let scalar = self.number_kind(&what)?;
+        self.ids(&what, count, scalar)
+    }
+
+    /// Passes over a field: named arrays that belong to no point or cell.
+    pub fn skip_field(&mut self) -> Result<(), VtkError> {
+        self.text.word();
+        let arrays = self.count("arrays")?;
+        for _ in 0..arrays {
+            let Some(name) = self.keyword()? else { return Err(self.ends("an array of FIELD")) };
+            if name == b"NULL_ARRAY" {
+                continue;
+            }
+            let (components, tuples) = (self.count("components")?, self.count("tuples")?);
+            let kind = self.kind("an array of FIELD")?;
+            self.skip(&kind, components.saturating_mul(tuples))?;
+        }
+        Ok(())
+    }
+
+    fn skip(&mut self, kind: &Kind, count: u64) -> Result<(), VtkError> {
+        let what = "an array of FIELD";
+        match kind {
+            Kind::Number(scalar) if self.binary => self.bytes(what, count, scalar.size()).map(|_| ()),
+            Kind::Bit if self.binary => self.bytes(what, count.div_ceil(8), 1).map(|_| ()),
+            Kind::String if self.binary => (0..count).try_for_each(|_| self.skip_string()),
+            Kind::Number(_) | Kind::Bit => {
+                self.text.expect(what, count)?;
+                (0..count).try_for_each(|_| self.text.word().map(|_| ()).ok_or_else(|| self.ends("the end of FIELD")))
+            }
+            Kind::String | Kind::Variant => {
+                self.text.blanks();
+                (0..count).try_for_each(|_| self.text.line().map(|_| ()).ok_or_else(|| self.ends("the end of FIELD")))
+            }
+        }
+    }
+
+    /// A binary string begins with its length, whose first two bits tell how many bytes the length has.
+    fn skip_string(&mut self) -> Result<(), VtkError> {
+        let what = "a string of FIELD";
+        let first = self.text.rest().first().copied().ok_or_else(|| self.ends(what))?;
+        let size = 8 >> (first >> 6);
+        let length = self.bytes(what, 1, size)?.iter().fold(0_u64, |n, b| n << 8 | u64::from(*b));
+        // Without the first two bits.
+        let mask = u64::MAX >> (64 - 8 * size + 2);
+        self.bytes(what, length & mask, 1).map(|_| ())
+    }
+}
+
+/// The layout before version 5: the number of corners of each cell before them.
+fn split(list: &[u32], cells: u64) -> Option<CornersAndEnds> {
+    let cells = usize::try_from(cells).ok().filter(|n| *n <= list.len())?;
+    let (mut corners, mut ends) = (Vec::with_capacity(list.len() - cells), Vec::with_capacity(cells));
+    let mut rest = list;
+    for _ in 0..cells {
+        let (count, others) = rest.split_first()?;
+        let (cell, others) = others.split_at_checked(*count as usize)?;
+        corners.extend_from_slice(cell);
+        ends.push(u32::try_from(corners.len()).ok()?);
+        rest = others;
+    }
+    rest.is_empty().then_some((corners, ends))
+}

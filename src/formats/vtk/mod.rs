@@ -1,0 +1,48 @@
+//! Files of VTK: legacy `.vtk`, and XML `.vtu` and `.vtp`.
+//!
+//! What a file is its first bytes tell, not its name. Everything that makes a surface is read, as triangles;
+//! vertices, lines and volumes are counted. Quadratic triangles and quadrilaterals give their corners: edges are
+//! taken to be straight.
+
+mod cell;
+mod error;
+mod legacy;
+mod legacy_arrays;
+mod scalar;
+mod surface;
+mod text;
+
+use super::{Content, ReadError, Source};
+pub use error::{PackedError, Place, VtkError};
+
+/// Reads a file of VTK.
+pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
+    let bytes = source.bytes;
+    if bytes.get(..legacy::HEAD.len()).is_some_and(|head| head.eq_ignore_ascii_case(legacy::HEAD)) {
+        return legacy::read(source);
+    }
+    let found = error::shown(&bytes[..bytes.len().min(24)]);
+    Err(VtkError::NoVtk { found }.into())
+}
+
+/// The refusal of a data set that is no surface.
+fn unsupported(place: Place, dataset: &str) -> VtkError {
+    let plain = dataset.trim_start_matches("vtk").replace('_', "").to_ascii_lowercase();
+    let (what, remedy) = match plain.as_str() {
+        "structuredgrid" | "structuredpoints" | "rectilineargrid" | "imagedata" | "hypertreegrid" => (
+            "a grid and no surface of triangles",
+            "in ParaView apply the filter Extract Surface (or Contour) and save the result as .vtp",
+        ),
+        p if ["multiblock", "partitioned", "hierarchical", "overlapping", "nonoverlapping", "collection"]
+            .iter()
+            .any(|kind| p.starts_with(kind)) =>
+        {
+            ("which names other files", "open its pieces: the .vtu and .vtp files that it names")
+        }
+        "punstructuredgrid" | "ppolydata" | "pimagedata" | "pstructuredgrid" | "prectilineargrid" => {
+            ("which names other files", "open its pieces: the .vtu and .vtp files that it names")
+        }
+        _ => ("which is no surface", "save a surface as POLYDATA or UNSTRUCTURED_GRID: .vtp, .vtu or .vtk"),
+    };
+    VtkError::Dataset { place, dataset: dataset.to_owned(), what, remedy }
+}

@@ -1,0 +1,193 @@
+//! Numbers as VTK stores them in bytes.
+
+use pipeline::space::Vec3;
+
+/// In which order the bytes of a number stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    Big,
+    Little,
+}
+
+/// A type of number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+/// Collects what `$each` makes of the numbers of a type, taken `$group` at a time.
+macro_rules! collected {
+    ($type:ty, $group:literal, $bytes:expr, $order:expr, $each:expr) => {{
+        let groups = $bytes.as_chunks::<{ size_of::<$type>() }>().0.as_chunks::<$group>().0;
+        match $order {
+            Order::Big => groups.iter().map(|g| $each(g.map(<$type>::from_be_bytes))).collect(),
+            Order::Little => groups.iter().map(|g| $each(g.map(<$type>::from_le_bytes))).collect(),
+        }
+    }};
+}
+
+/// The first number of a type that is none from 0 to 2^32 - 1, or all of them as such.
+macro_rules! whole {
+    ($type:ty, $bytes:expr, $order:expr) => {{
+        let numbers = $bytes.as_chunks::<{ size_of::<$type>() }>().0;
+        let value = |b: [u8; size_of::<$type>()]| match $order {
+            Order::Big => <$type>::from_be_bytes(b),
+            Order::Little => <$type>::from_le_bytes(b),
+        };
+        match numbers.iter().position(|b| u32::try_from(value(*b)).is_err()) {
+            Some(entry) => Err(BadId { entry, value: value(numbers[entry]).to_string() }),
+            None => Ok(collected!($type, 1, $bytes, $order, |[n]: [$type; 1]| n as u32)),
+        }
+    }};
+}
+
+/// A number that can be no id.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct BadId {
+    /// Which one.
+    pub entry: usize,
+    /// The number.
+    pub value: String,
+}
+
+impl Scalar {
+    /// The type of this name in legacy files, in lower case. An id is stored there as an int.
+    pub fn legacy(name: &[u8]) -> Option<Self> {
+        Some(match name {
+            b"char" | b"signed_char" => Self::I8,
+            b"unsigned_char" => Self::U8,
+            b"short" => Self::I16,
+            b"unsigned_short" => Self::U16,
+            b"int" | b"vtkidtype" => Self::I32,
+            b"unsigned_int" => Self::U32,
+            b"long" | b"vtktypeint64" => Self::I64,
+            b"unsigned_long" | b"vtktypeuint64" => Self::U64,
+            b"float" => Self::F32,
+            b"double" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// The type of this name in XML files.
+    pub fn xml(name: &str) -> Option<Self> {
+        Some(match name {
+            "Int8" => Self::I8,
+            "UInt8" => Self::U8,
+            "Int16" => Self::I16,
+            "UInt16" => Self::U16,
+            "Int32" => Self::I32,
+            "UInt32" => Self::U32,
+            "Int64" => Self::I64,
+            "UInt64" => Self::U64,
+            "Float32" => Self::F32,
+            "Float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// Bytes of a number.
+    pub fn size(self) -> u64 {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+
+    /// Whether numbers of this type count.
+    pub fn is_whole(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
+    /// Triples of numbers; bytes that make no whole triple are left out.
+    pub fn points(self, bytes: &[u8], order: Order) -> Vec<Vec3> {
+        macro_rules! points {
+            ($type:ty) => {
+                collected!($type, 3, bytes, order, |p: [$type; 3]| p.map(|c| c as f64))
+            };
+        }
+        match self {
+            Self::I8 => points!(i8),
+            Self::U8 => points!(u8),
+            Self::I16 => points!(i16),
+            Self::U16 => points!(u16),
+            Self::I32 => points!(i32),
+            Self::U32 => points!(u32),
+            Self::I64 => points!(i64),
+            Self::U64 => points!(u64),
+            Self::F32 => points!(f32),
+            Self::F64 => points!(f64),
+        }
+    }
+
+    /// Whole numbers; bytes that make none are left out. Floating point numbers are no ids.
+    pub fn ids(self, bytes: &[u8], order: Order) -> Result<Vec<u32>, BadId> {
+        match self {
+            Self::I8 => whole!(i8, bytes, order),
+            Self::U8 => whole!(u8, bytes, order),
+            Self::I16 => whole!(i16, bytes, order),
+            Self::U16 => whole!(u16, bytes, order),
+            Self::I32 => whole!(i32, bytes, order),
+            Self::U32 => whole!(u32, bytes, order),
+            Self::I64 => whole!(i64, bytes, order),
+            Self::U64 => whole!(u64, bytes, order),
+            Self::F32 | Self::F64 => Err(BadId { entry: 0, value: "of floating point".to_owned() }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: [(&str, Scalar); 10] = [
+        ("Int8", Scalar::I8),
+        ("UInt8", Scalar::U8),
+        ("Int16", Scalar::I16),
+        ("UInt16", Scalar::U16),
+        ("Int32", Scalar::I32),
+        ("UInt32", Scalar::U32),
+        ("Int64", Scalar::I64),
+        ("UInt64", Scalar::U64),
+        ("Float32", Scalar::F32),
+        ("Float64", Scalar::F64),
+    ];
+
+    #[test]
+    fn whole_numbers_of_every_size_and_order_are_read() {
+        for (name, scalar) in ALL {
+            assert_eq!(Scalar::xml(name), Some(scalar));
+            let size = scalar.size() as usize;
+            if !scalar.is_whole() {
+                assert!(scalar.ids(&[0; 8], Order::Big).is_err());
+                continue;
+            }
+            let little = [&[7][..], &vec![0; size - 1]].concat();
+            let big: Vec<u8> = little.iter().rev().copied().collect();
+            assert_eq!(scalar.ids(&little, Order::Little), Ok(vec![7]), "{name}");
+            assert_eq!(scalar.ids(&big.repeat(2), Order::Big), Ok(vec![7, 7]), "{name}");
+            assert_eq!(scalar.points(&big.repeat(3), Order::Big), [[7.0; 3]], "{name}");
+        }
+        assert_eq!(Scalar::F32.points(&1.5_f32.to_be_bytes().repeat(3), Order::Big), [[1.5; 3]]);
+        assert_eq!(Scalar::F64.points(&(-1.5_f64).to_le_bytes().repeat(3), Order::Little), [[-1.5; 3]]);
+    }
+
+    #[test]
+    fn negative_and_large_numbers_are_no_ids() {
+        let bytes = [1_i64, -2].map(i64::to_le_bytes).concat();
+        assert_eq!(Scalar::I64.ids(&bytes, Order::Little), Err(BadId { entry: 1, value: "-2".to_owned() }));
+        let large = (1_u64 << 32).to_le_bytes();
+        assert_eq!(Scalar::U64.ids(&large, Order::Little).expect_err("large").value, "4294967296");
+        assert_eq!(Scalar::U32.ids(&[255; 4], Order::Little), Ok(vec![u32::MAX]));
+    }
+}

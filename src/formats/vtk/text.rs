@@ -1,0 +1,111 @@
+//! Words and numbers of text, with the place of what is wrong.
+
+use super::error::{Place, VtkError, shown};
+use pipeline::space::Vec3;
+
+/// Text of a file, read from its front.
+#[derive(Clone, Debug)]
+pub(super) struct Text<'a> {
+    /// The file up to the end of the text.
+    pub bytes: &'a [u8],
+    /// The first byte that is not read yet.
+    pub at: usize,
+}
+
+impl<'a> Text<'a> {
+    /// What is not read yet.
+    pub fn rest(&self) -> &'a [u8] {
+        &self.bytes[self.at..]
+    }
+
+    /// The line that is read.
+    pub fn place(&self) -> Place {
+        Place::line(self.bytes, self.at)
+    }
+
+    /// Passes over blanks and ends of lines.
+    pub fn blanks(&mut self) {
+        let rest = self.rest();
+        self.at += rest.len() - rest.trim_ascii_start().len();
+    }
+
+    /// The next word.
+    pub fn word(&mut self) -> Option<&'a [u8]> {
+        self.blanks();
+        let rest = self.rest();
+        let word = &rest[..rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len())];
+        self.at += word.len();
+        (!word.is_empty()).then_some(word)
+    }
+
+    /// The rest of the line, without its end; none at the end of the text.
+    pub fn line(&mut self) -> Option<&'a [u8]> {
+        let rest = self.rest();
+        let line = rest.split_inclusive(|b| *b == b'\n').next()?;
+        self.at += line.len();
+        Some(line.trim_ascii_end())
+    }
+
+    /// The error that something makes no sense here.
+    pub fn syntax(&self, problem: impl Into<String>) -> VtkError {
+        VtkError::Syntax { place: self.place(), problem: problem.into() }
+    }
+
+    /// Text may hold so many numbers: each takes a blank and a digit.
+    pub fn expect(&self, what: &str, declared: u64) -> Result<(), VtkError> {
+        let there = (self.rest().len() as u64).div_ceil(2);
+        if declared <= there {
+            return Ok(());
+        }
+        Err(VtkError::Count { place: self.place(), what: what.to_owned(), declared, there })
+    }
+
+    fn number<T: std::str::FromStr>(&mut self, kind: &str, what: &str) -> Result<Option<T>, VtkError> {
+        let Some(word) = self.word() else { return Ok(None) };
+        let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
+        match number {
+            Some(number) => Ok(Some(number)),
+            None => Err(self.syntax(format!("\"{}\" is no {kind} of {what}", shown(word)))),
+        }
+    }
+
+    /// This many points.
+    pub fn points(&mut self, what: &str, count: u64) -> Result<Vec<Vec3>, VtkError> {
+        let declared = count.saturating_mul(3);
+        self.expect(what, declared)?;
+        let mut points = vec![[0.0; 3]; count as usize];
+        for (there, coordinate) in (0..).zip(points.as_flattened_mut()) {
+            match self.number("coordinate", what)? {
+                Some(number) => *coordinate = number,
+                None => return Err(self.count(what, declared, there)),
+            }
+        }
+        Ok(points)
+    }
+
+    /// This many ids.
+    pub fn ids(&mut self, what: &str, count: u64) -> Result<Vec<u32>, VtkError> {
+        self.expect(what, count)?;
+        let mut ids = vec![0; count as usize];
+        for (there, id) in (0..).zip(&mut ids) {
+            match self.number("whole number", what)? {
+                Some(number) => *id = number,
+                None => return Err(self.count(what, count, there)),
+            }
+        }
+        Ok(ids)
+    }
+
+    /// All ids that there are.
+    pub fn all_ids(&mut self, what: &str) -> Result<Vec<u32>, VtkError> {
+        let mut ids = Vec::new();
+        while let Some(id) = self.number("whole number", what)? {
+            ids.push(id);
+        }
+        Ok(ids)
+    }
+
+    fn count(&self, what: &str, declared: u64, there: u64) -> VtkError {
+        VtkError::Count { place: self.place(), what: what.to_owned(), declared, there }
+    }
+}
