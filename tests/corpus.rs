@@ -6,6 +6,7 @@ use crate::interop::assert_vtk_agrees;
 use crate::interop::remesh::assert_gmsh_remeshes;
 use crate::legality::assert_legal;
 use crate::support::{Out, planish, root};
+use planish::formats::{Kind, kind};
 use planish::outcome::{Code, Status};
 use planish::report::Report;
 use std::collections::BTreeMap;
@@ -140,7 +141,7 @@ fn counts_are_those_of_the_manifest() {
     let mut seen = 0;
     for row in manifest(&meshes) {
         let path = meshes.join(&row["file"]);
-        if !["stl", "obj"].contains(&path.extension().and_then(|e| e.to_str()).unwrap_or_default()) {
+        if !matches!(kind(&path), Kind::Mesh(_)) {
             continue;
         }
         let answer: serde_json::Value =
@@ -182,7 +183,7 @@ fn broken_files_do_what_the_manifest_says() {
     let Some(malformed) = shared("malformed") else { return };
     for row in manifest(&malformed) {
         let name = &row["file"];
-        let readable = name.ends_with(".stl") || name.ends_with(".obj");
+        let readable = matches!(kind(Path::new(name)), Kind::Mesh(_));
         let (_, reports) = run_all(&[malformed.join(name)], &[]);
         let report = &reports[0].1;
         let reason = report.reason.as_ref();

@@ -4,7 +4,7 @@
 //! in between (`FIELD`, `METADATA`) is passed over.
 
 use super::cell;
-use super::error::{Place, VtkError, shown};
+use super::error::{VtkError, shown};
 use super::legacy_arrays::Arrays;
 use super::surface::{Cells, Surface, Types};
 use super::unsupported;
@@ -56,7 +56,7 @@ fn header(file: &mut Arrays) -> Result<String, VtkError> {
 fn polydata(file: &mut Arrays, surface: &mut Surface) -> Result<(), VtkError> {
     let mut has_points = false;
     loop {
-        let place = file.place();
+        let at = file.text.at;
         let keyword = file.keyword()?;
         let (section, cell_type) = match keyword.as_deref() {
             Some(b"POINTS") if !has_points => {
@@ -81,7 +81,7 @@ fn polydata(file: &mut Arrays, surface: &mut Surface) -> Result<(), VtkError> {
         match cell_type {
             Some(one) => {
                 let cells = Cells { section, types: Types::All(one), corners: &corners, ends: &ends };
-                surface.add_cells(&cells, place)?;
+                surface.add_cells(&cells, || file.place_at(at))?;
             }
             None => surface.skip(section, ends.len()),
         }
@@ -90,24 +90,24 @@ fn polydata(file: &mut Arrays, surface: &mut Surface) -> Result<(), VtkError> {
 
 /// `POINTS`, their number, type, and coordinates.
 fn points(file: &mut Arrays, surface: &mut Surface) -> Result<(), VtkError> {
-    let place = file.place();
+    let at = file.text.at;
     let points = file.points(surface.room_for_points())?;
-    surface.add_points(points, place)
+    surface.add_points(points, || file.place_at(at))
 }
 
 /// The cells of an unstructured grid that make a surface.
 fn unstructured_grid(file: &mut Arrays, surface: &mut Surface) -> Result<(), VtkError> {
     let (mut has_points, mut cells, mut types) = (false, None, None);
-    let mut place = file.place();
+    let mut at = file.text.at;
     while !(has_points && cells.is_some() && types.is_some()) {
-        let here = file.place();
+        let here = file.text.at;
         match file.keyword()?.as_deref() {
             Some(b"POINTS") if !has_points => {
                 points(file, surface)?;
                 has_points = true;
             }
             Some(b"CELLS") if cells.is_none() => {
-                place = here;
+                at = here;
                 cells = Some(file.cells("CELLS")?);
             }
             Some(b"CELL_TYPES") if types.is_none() => types = Some(file.types()?),
@@ -117,15 +117,13 @@ fn unstructured_grid(file: &mut Arrays, surface: &mut Surface) -> Result<(), Vtk
         }
     }
     let ((corners, ends), types) = (cells.unwrap_or_default(), types.unwrap_or_default());
-    add(surface, &corners, &ends, &types, place)
-}
-
-fn add(surface: &mut Surface, corners: &[u32], ends: &[u32], types: &[u8], place: Place) -> Result<(), VtkError> {
+    let place = || file.place_at(at);
     if types.len() != ends.len() {
         let (declared, there) = (ends.len() as u64, types.len() as u64);
-        return Err(VtkError::Count { place, what: "CELL_TYPES".to_owned(), declared, there });
+        return Err(VtkError::Count { place: place(), what: "CELL_TYPES".to_owned(), declared, there });
     }
-    surface.add_cells(&Cells { section: "CELLS", types: Types::Each(types), corners, ends }, place)
+    let types = Types::Each(&types);
+    surface.add_cells(&Cells { section: "CELLS", types, corners: &corners, ends: &ends }, place)
 }
 
 #[cfg(test)]

@@ -31,9 +31,14 @@ impl<'a> Arrays<'a> {
         Self { text: Text { bytes, at: 0 }, binary: false }
     }
 
-    /// Where the file is read. Binary arrays hold bytes that look like ends of lines.
+    /// Where the file is read.
     pub fn place(&self) -> Place {
-        if self.binary { Place::Byte(self.text.at) } else { self.text.place() }
+        self.place_at(self.text.at)
+    }
+
+    /// The place of a byte. Binary arrays hold bytes that look like ends of lines.
+    pub fn place_at(&self, at: usize) -> Place {
+        if self.binary { Place::Byte(at) } else { Place::line(self.text.bytes, at) }
     }
 
     /// The next keyword, in upper case, after what is told about the array before it.
@@ -113,11 +118,11 @@ impl<'a> Arrays<'a> {
 
     /// Points: their number, of at most `most`, type and coordinates.
     pub fn points(&mut self, most: u64) -> Result<Vec<Vec3>, VtkError> {
-        let place = self.place();
+        let at = self.text.at;
         let count = self.count("points")?;
         let scalar = self.number_kind("coordinates")?;
         if count > most {
-            return Err(VtkError::TooLarge { place, what: "points", declared: count, limit: most });
+            return Err(VtkError::TooLarge { place: self.place_at(at), what: "points", declared: count, limit: most });
         }
         if !self.binary {
             return self.text.points("POINTS", count);
@@ -149,7 +154,7 @@ impl<'a> Arrays<'a> {
 
     /// Cells: the corners of one after the other, and where each ends.
     pub fn cells(&mut self, section: &str) -> Result<CornersAndEnds, VtkError> {
-        let place = self.place();
+        let at = self.text.at;
         let (count, size) = (self.count("cells")?, self.count("corners")?);
         self.end_of_line();
         if !self.binary {
@@ -162,7 +167,7 @@ impl<'a> Arrays<'a> {
         let list = self.ids(section, size, Scalar::I32)?;
         split(&list, count).ok_or_else(|| {
             let problem = format!("{section}: {size} numbers are not those of {count} cells with the count of each");
-            VtkError::Syntax { place, problem }
+            VtkError::Syntax { place: self.place_at(at), problem }
         })
     }
 

@@ -8,18 +8,29 @@ mod cell;
 mod error;
 mod legacy;
 mod legacy_arrays;
+mod packed;
 mod scalar;
 mod surface;
 mod text;
+mod xml;
+mod xml_outline;
+#[cfg(test)]
+mod xml_tests;
 
 use super::{Content, ReadError, Source};
-pub use error::{PackedError, Place, VtkError};
+use error::Place;
+pub use error::VtkError;
 
 /// Reads a file of VTK.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let bytes = source.bytes;
     if bytes.get(..legacy::HEAD.len()).is_some_and(|head| head.eq_ignore_ascii_case(legacy::HEAD)) {
         return legacy::read(source);
+    }
+    // What stands before an XML file is no part of it.
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    if text.starts_with(b"<?xml") || text.starts_with(b"<VTKFile") || text.starts_with(b"<!--") {
+        return xml::read(&Source { bytes: text, ..*source });
     }
     let found = error::shown(&bytes[..bytes.len().min(24)]);
     Err(VtkError::NoVtk { found }.into())

@@ -53,11 +53,11 @@ impl<'a> Surface<'a> {
         self.limits.elements.min(u64::from(u32::MAX) - 1).saturating_sub(self.points.len() as u64)
     }
 
-    /// Begins a piece with these points.
-    pub fn add_points(&mut self, points: Vec<Vec3>, place: Place) -> Result<(), VtkError> {
+    /// Begins a piece with these points. (Places are told when it comes to it: to count lines takes time.)
+    pub fn add_points(&mut self, points: Vec<Vec3>, place: impl FnOnce() -> Place) -> Result<(), VtkError> {
         let declared = (self.points.len() + points.len()) as u64;
         if points.len() as u64 > self.room_for_points() {
-            return Err(VtkError::TooLarge { place, what: "points", declared, limit: self.limits.elements });
+            return Err(VtkError::TooLarge { place: place(), what: "points", declared, limit: self.limits.elements });
         }
         self.base = self.points.len();
         if self.points.is_empty() {
@@ -74,7 +74,7 @@ impl<'a> Surface<'a> {
     }
 
     /// Adds the triangles of cells of the piece at hand.
-    pub fn add_cells(&mut self, cells: &Cells, place: Place) -> Result<(), VtkError> {
+    pub fn add_cells(&mut self, cells: &Cells, place: impl FnOnce() -> Place) -> Result<(), VtkError> {
         if !matches!(cells.types, Types::All(cell::STRIP)) {
             self.triangles.reserve(cells.ends.len().min(cells.corners.len() / 3));
         }
@@ -91,7 +91,7 @@ impl<'a> Surface<'a> {
             self.add(cell_type, corners).map_err(|problem| problem.at(cell, cells.section))?;
             if self.triangles.len() as u64 > self.limits.elements {
                 let (declared, limit) = (self.triangles.len() as u64, self.limits.elements);
-                return Err(VtkError::TooLarge { place, what: "triangles", declared, limit });
+                return Err(VtkError::TooLarge { place: place(), what: "triangles", declared, limit });
             }
             start = *end as usize;
         }
@@ -203,10 +203,10 @@ mod tests {
         let mut surface = Surface::new(&limits, "VTK".to_owned());
         // A piece of its own comes first: cells count from the second.
         for _ in 0..2 {
-            surface.add_points([SQUARE, SQUARE, SQUARE].concat(), Place::Line(1))?;
+            surface.add_points([SQUARE, SQUARE, SQUARE].concat(), || Place::Line(1))?;
         }
         let (types, ends) = (Types::All(cell_type), [corners.len() as u32]);
-        surface.add_cells(&Cells { section: "CELLS", types, corners, ends: &ends }, Place::Line(2))?;
+        surface.add_cells(&Cells { section: "CELLS", types, corners, ends: &ends }, || Place::Line(2))?;
         surface.finish()
     }
 
@@ -257,9 +257,9 @@ mod tests {
         let limits = Limits { elements: 5, ..Limits::default() };
         for ends in [&[3, 2, 6][..], &[3, 7], &[7]] {
             let mut surface = Surface::new(&limits, "VTK".to_owned());
-            surface.add_points(SQUARE.to_vec(), Place::Line(1)).expect("few");
+            surface.add_points(SQUARE.to_vec(), || Place::Line(1)).expect("few");
             let cells = Cells { section: "Polys", types: Types::All(7), corners: &[0, 1, 2, 2, 1, 3], ends };
-            assert!(matches!(surface.add_cells(&cells, Place::Line(2)), Err(VtkError::Offset { .. })), "{ends:?}");
+            assert!(matches!(surface.add_cells(&cells, || Place::Line(2)), Err(VtkError::Offset { .. })), "{ends:?}");
         }
     }
 
@@ -267,11 +267,11 @@ mod tests {
     fn limits_hold_for_all_pieces_together() {
         let limits = Limits { elements: 5, ..Limits::default() };
         let mut surface = Surface::new(&limits, "VTK".to_owned());
-        surface.add_points(SQUARE.to_vec(), Place::Line(1)).expect("few");
+        surface.add_points(SQUARE.to_vec(), || Place::Line(1)).expect("few");
         let corners: Vec<u32> = [0, 1, 2].repeat(6);
         let cells = Cells { section: "Polys", types: Types::All(7), corners: &corners, ends: &[3, 6, 9, 12, 15, 18] };
-        let error = surface.add_cells(&cells, Place::Line(2)).expect_err("too many");
+        let error = surface.add_cells(&cells, || Place::Line(2)).expect_err("too many");
         assert_eq!(error, VtkError::TooLarge { place: Place::Line(2), what: "triangles", declared: 6, limit: 5 });
-        assert!(matches!(surface.add_points(SQUARE.to_vec(), Place::Line(1)), Err(VtkError::TooLarge { .. })));
+        assert!(matches!(surface.add_points(SQUARE.to_vec(), || Place::Line(1)), Err(VtkError::TooLarge { .. })));
     }
 }

@@ -96,15 +96,6 @@ impl<'a> Text<'a> {
         Ok(ids)
     }
 
-    /// All ids that there are.
-    pub fn all_ids(&mut self, what: &str) -> Result<Vec<u32>, VtkError> {
-        let mut ids = Vec::new();
-        while let Some(id) = self.number("whole number", what)? {
-            ids.push(id);
-        }
-        Ok(ids)
-    }
-
     fn count(&self, what: &str, declared: u64, there: u64) -> VtkError {
         VtkError::Count { place: self.place(), what: what.to_owned(), declared, there }
     }

@@ -1,0 +1,176 @@
+//! VTK XML files: `.vtu` and `.vtp`, in every encoding.
+
+use super::error::{Place, VtkError};
+use super::packed::{Budget, Compressor, Packing, Stream, unpack};
+use super::scalar::Order;
+use super::surface::{Cells, Surface, Types};
+use super::text::Text;
+use super::xml_outline::{Appended, Array, Data, Outline, Piece, Role, Section, outline};
+use crate::formats::{Content, ReadError, Source};
+use pipeline::space::Vec3;
+use std::borrow::Cow;
+
+/// Reads an XML file.
+pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
+    let file = outline(source.bytes, source.limits.depth)?;
+    let mut surface = Surface::new(source.limits, format(&file));
+    let budget = Budget::new(source.bytes.len(), source.limits.expansion);
+    let mut arrays = Arrays { bytes: source.bytes, packing: file.packing, appended: file.appended, budget };
+    for piece in &file.pieces {
+        arrays.piece(piece, &mut surface)?;
+    }
+    surface.finish()
+}
+
+/// The format as it is told.
+fn format(file: &Outline) -> String {
+    let appended_base64 = file.appended.is_some_and(|a| a.base64);
+    let points = file.pieces.iter().find_map(|p| p.array(Role::Points));
+    let encoding = match points.map(|p| p.data) {
+        Some(Data::Ascii(..)) | None => return format!("{}, ASCII", file.kind),
+        Some(Data::Inline(_)) => "inline base64",
+        Some(Data::Appended(_)) if appended_base64 => "appended base64",
+        Some(Data::Appended(_)) => "appended raw",
+    };
+    let compressor = match file.packing.compressor {
+        None => "",
+        Some(Compressor::Zlib) => ", zlib",
+        Some(Compressor::Lz4) => ", lz4",
+        Some(Compressor::Lzma) => ", lzma",
+    };
+    let order = if file.packing.order == Order::Big { ", big-endian" } else { "" };
+    format!("{}, {encoding}{compressor}{order}", file.kind)
+}
+
+/// Decodes the arrays of a file.
+struct Arrays<'a> {
+    bytes: &'a [u8],
+    packing: Packing,
+    appended: Option<Appended<'a>>,
+    budget: Budget,
+}
+
+impl<'a> Arrays<'a> {
+    /// Adds the surface of a piece.
+    fn piece(&mut self, piece: &Piece<'a>, surface: &mut Surface) -> Result<(), VtkError> {
+        let bytes = self.bytes;
+        let place = || Place::line(bytes, piece.at);
+        if piece.points > surface.room_for_points() {
+            let limit = surface.room_for_points();
+            return Err(VtkError::TooLarge { place: place(), what: "points", declared: piece.points, limit });
+        }
+        let points = match piece.array(Role::Points) {
+            Some(array) => self.points(&array, piece.points)?,
+            None => Vec::new(),
+        };
+        surface.add_points(points, place)?;
+        for (section, count) in Section::ALL.into_iter().zip(piece.cells) {
+            match section {
+                _ if count == 0 => {}
+                Section::Verts => surface.skip("vertices", count as usize),
+                Section::Lines => surface.skip("lines", count as usize),
+                Section::Cells | Section::Strips | Section::Polys => self.cells(piece, section, count, surface)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the cells of a section.
+    fn cells(
+        &mut self,
+        piece: &Piece<'a>,
+        section: Section,
+        count: u64,
+        surface: &mut Surface,
+    ) -> Result<(), VtkError> {
+        let ends = self.ids(piece, Role::Offsets(section), count)?;
+        let needed = ends.last().copied().unwrap_or_default();
+        let corners = self.ids(piece, Role::Connectivity(section), u64::from(needed))?;
+        let own_types: Vec<u8>;
+        let types = match section.cell_type() {
+            Some(one) => Types::All(one),
+            None => {
+                let types = self.ids(piece, Role::Types, count)?;
+                // What does not fit is no type that VTK has; neither is 255.
+                own_types = types.into_iter().map(|t| u8::try_from(t).unwrap_or(u8::MAX)).collect();
+                Types::Each(&own_types)
+            }
+        };
+        let cells = Cells { section: section.name(), types, corners: &corners, ends: &ends };
+        surface.add_cells(&cells, || Place::line(self.bytes, piece.at))
+    }
+
+    /// The first `count` points of an array.
+    fn points(&mut self, array: &Array<'a>, count: u64) -> Result<Vec<Vec3>, VtkError> {
+        let name = Role::Points.name();
+        if let Some(components) = array.components.filter(|c| *c != 3) {
+            let problem = format!("Points have {components} components instead of 3");
+            return Err(VtkError::Syntax { place: Place::line(self.bytes, array.at), problem });
+        }
+        if let Data::Ascii(bytes, at) = array.data {
+            return Text { bytes, at }.points(&name, count);
+        }
+        let bytes = self.bytes_of(array, &name)?;
+        let declared = count.saturating_mul(3);
+        let needed = self.at_least(array, &name, declared, bytes.len() as u64 / array.scalar.size())?;
+        Ok(array.scalar.points(&bytes[..(needed * array.scalar.size()) as usize], self.packing.order))
+    }
+
+    /// The first `count` numbers of an array.
+    fn ids(&mut self, piece: &Piece<'a>, role: Role, count: u64) -> Result<Vec<u32>, VtkError> {
+        let name = role.name();
+        let Some(array) = piece.array(role) else {
+            let place = Place::line(self.bytes, piece.at);
+            return Err(VtkError::Count { place, what: name, declared: count, there: 0 });
+        };
+        if let Data::Ascii(bytes, at) = array.data {
+            return Text { bytes, at }.ids(&name, count);
+        }
+        let bytes = self.bytes_of(&array, &name)?;
+        let needed = self.at_least(&array, &name, count, bytes.len() as u64 / array.scalar.size())?;
+        let ids = array.scalar.ids(&bytes[..(needed * array.scalar.size()) as usize], self.packing.order);
+        ids.map_err(|bad| {
+            let problem = format!("number {} of {name} is {}, which is no id", bad.entry, bad.value);
+            VtkError::Syntax { place: self.place(&array), problem }
+        })
+    }
+
+    fn at_least(&self, array: &Array, name: &str, declared: u64, there: u64) -> Result<u64, VtkError> {
+        if declared <= there {
+            return Ok(declared);
+        }
+        Err(VtkError::Count { place: self.place(array), what: name.to_owned(), declared, there })
+    }
+
+    /// Where the numbers of an array begin.
+    fn place(&self, array: &Array) -> Place {
+        match (array.data, self.appended) {
+            (Data::Appended(offset), Some(appended)) => Place::Byte(appended.at.saturating_add(offset as usize)),
+            _ => Place::line(self.bytes, array.at),
+        }
+    }
+
+    /// The bytes of an array that is no text.
+    fn bytes_of(&mut self, array: &Array<'a>, name: &str) -> Result<Cow<'a, [u8]>, VtkError> {
+        let stream = match (array.data, self.appended) {
+            (Data::Appended(offset), Some(appended)) => {
+                let data = usize::try_from(offset).ok().and_then(|offset| appended.bytes.get(offset..));
+                let Some(data) = data else {
+                    let problem = format!("{name} begin at byte {offset} of {} appended bytes", appended.bytes.len());
+                    return Err(VtkError::Syntax { place: Place::line(self.bytes, array.at), problem });
+                };
+                if appended.base64 { Stream::base64(data) } else { Stream::Raw(data) }
+            }
+            (Data::Appended(_), None) => {
+                let problem = format!("{name} are appended, but there is no <AppendedData>: the file was cut off");
+                return Err(VtkError::Syntax { place: Place::line(self.bytes, array.at), problem });
+            }
+            (Data::Inline(text), _) => Stream::base64_with_blanks(text),
+            (Data::Ascii(..), _) => Stream::Raw(&[]),
+        };
+        unpack(stream, self.packing, &mut self.budget).map_err(|problem| {
+            let (place, what) = (self.place(array), name.to_owned());
+            VtkError::Packed { place, what, problem }
+        })
+    }
+}
