@@ -59,6 +59,16 @@ impl Default for Limits {
     }
 }
 
+/// Files smaller than this are taken to be this large where what comes out of them is compared with their size.
+const SMALL: u64 = 1 << 20;
+
+impl Limits {
+    /// How many bytes may come out of a file of this size.
+    pub fn unpacked(&self, file: usize) -> u64 {
+        SMALL.max(file as u64).saturating_mul(self.expansion)
+    }
+}
+
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Content {

@@ -11,9 +11,6 @@ use std::collections::BTreeMap;
 /// A point of glTF takes at least this many bytes in memory here.
 const POINT: u64 = 24;
 
-/// Files smaller than this are taken to be this large where memory is compared with size.
-const LEAST: u64 = 1 << 20;
-
 /// All triangles of a scene.
 #[derive(Default)]
 pub(super) struct Scene {
@@ -38,8 +35,7 @@ struct Walk<'a> {
 impl Scene {
     /// Reads the default scene; without scenes, all nodes that are nobody's children; without nodes, all meshes.
     pub fn read(root: &Root, buffers: &Buffers, source: &Source) -> Result<Self, GltfError> {
-        let size = LEAST.max(source.bytes.len() as u64);
-        let most = source.limits.elements.min(size.saturating_mul(source.limits.expansion) / POINT);
+        let most = source.limits.elements.min(source.limits.unpacked(source.bytes.len()) / POINT);
         let accessors = Accessors { root, buffers, most };
         let mut walk = Walk { root, accessors, most, scene: Self::default() };
         let mut meshes: Vec<(usize, Transform)> = instances(root)?;

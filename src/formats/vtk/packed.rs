@@ -60,9 +60,8 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    pub fn new(file: usize, expansion: u64) -> Self {
-        let file = file as u64;
-        Self { stored: file.saturating_mul(SHARED), unpacked: file.saturating_mul(expansion) }
+    pub fn new(file: usize, unpacked: u64) -> Self {
+        Self { stored: (file as u64).saturating_mul(SHARED), unpacked }
     }
 
     fn store(&mut self, bytes: u64) -> Result<(), PackedError> {

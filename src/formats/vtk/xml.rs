@@ -14,7 +14,7 @@ use std::borrow::Cow;
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let file = outline(source.bytes, source.limits.depth)?;
     let mut surface = Surface::new(source.limits, format(&file));
-    let budget = Budget::new(source.bytes.len(), source.limits.expansion);
+    let budget = Budget::new(source.bytes.len(), source.limits.unpacked(source.bytes.len()));
     let mut arrays = Arrays { bytes: source.bytes, packing: file.packing, appended: file.appended, budget };
     for piece in &file.pieces {
         arrays.piece(piece, &mut surface)?;
