@@ -25,7 +25,7 @@ fn refusals_say_where_and_what_to_do() {
         ("word.stl", b"solid\nfacet normal 0 0 1\nouter loop\nvertex a 0 0\n", Code::Malformed, Some("line 4")),
         ("flat.obj", b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", Code::OnlyDegenerate, None),
         ("part.xyz", b"1 2 3", Code::UnknownExtension, Some("file name")),
-        ("part.ply", b"ply\n", Code::UnsupportedFormat, Some("file name")),
+        ("part.off", b"OFF\n", Code::UnsupportedFormat, Some("file name")),
         ("part.mtl", b"newmtl a\n", Code::NotAMesh, Some("file name")),
     ];
     for (name, bytes, code, place) in cases {

@@ -3,13 +3,18 @@
 mod content;
 mod gltf;
 pub mod gmsh;
+#[cfg(test)]
+mod mutate;
 mod obj;
+mod place;
+mod ply;
 mod polygon;
 mod stl;
 mod vtk;
 pub mod vtm;
 pub mod vtp;
 pub mod vtu;
+mod words;
 
 use crate::outcome::{Code, Reason};
 pub use content::{Beside, Content, Limits, Notes, Nothing, Source};
@@ -31,6 +36,8 @@ pub enum Format {
     Vtu,
     /// VTK XML, polygons.
     Vtp,
+    /// Polygon File Format, ASCII or binary.
+    Ply,
 }
 
 /// What the name of a file says about it.
@@ -47,7 +54,7 @@ pub enum Kind {
 }
 
 /// Extensions of meshes in formats that this version does not read.
-const OTHER_MESHES: [&str; 3] = ["ply", "msh", "off"];
+const OTHER_MESHES: [&str; 2] = ["msh", "off"];
 
 /// Extensions of what lies beside meshes.
 const NO_MESHES: [&str; 13] =
@@ -66,6 +73,7 @@ pub fn kind(path: &Path) -> Kind {
         // Files that name others are told apart by what they hold, and refused with the names of the right ones.
         "vtu" | "pvtu" => Kind::Mesh(Format::Vtu),
         "vtp" | "pvtp" | "vtm" => Kind::Mesh(Format::Vtp),
+        "ply" => Kind::Mesh(Format::Ply),
         e if OTHER_MESHES.contains(&e) => Kind::OtherMesh(extension),
         e if NO_MESHES.contains(&e) => Kind::NoMesh,
         _ => Kind::Unknown(extension),
@@ -90,6 +98,9 @@ pub enum ReadError {
     /// Not a VTK file, or none with a surface.
     #[error(transparent)]
     Vtk(#[from] vtk::VtkError),
+    /// Not a PLY file.
+    #[error(transparent)]
+    Ply(#[from] ply::PlyError),
     /// What was read makes no sense.
     #[error(transparent)]
     Soup(#[from] SoupError),
@@ -104,6 +115,7 @@ impl ReadError {
             Self::Obj(e) => (e.code(), e.place()),
             Self::Gltf(e) => (e.code(), e.place()),
             Self::Vtk(e) => (e.code(), e.place()),
+            Self::Ply(e) => (e.code(), e.place()),
             Self::Soup(e) => soup_reason(e),
         };
         Reason { code, message: self.to_string(), place }
@@ -133,6 +145,7 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
         Format::Obj => obj::read(bytes),
         Format::Gltf => gltf::read(source),
         Format::Vtk | Format::Vtu | Format::Vtp => vtk::read(source),
+        Format::Ply => ply::read(source),
     }
 }
 
@@ -152,7 +165,8 @@ mod tests {
     fn names_tell_kinds() {
         assert_eq!(kind(Path::new("a/Part.STL")), Kind::Mesh(Format::Stl));
         assert_eq!(kind(Path::new("scan.obj")), Kind::Mesh(Format::Obj));
-        assert_eq!(kind(Path::new("scan.ply")), Kind::OtherMesh("ply".to_owned()));
+        assert_eq!(kind(Path::new("scan.ply")), Kind::Mesh(Format::Ply));
+        assert_eq!(kind(Path::new("scan.off")), Kind::OtherMesh("off".to_owned()));
         for beside in ["scan.mtl", ".scan.stl", "scan.stl.part", "scan.obj~", "a.png"] {
             assert_eq!(kind(Path::new(beside)), Kind::NoMesh, "{beside}");
         }

@@ -16,15 +16,22 @@ const LOOKS: usize = 1000;
 /// Cuts the polygon with these corner indices, all of which must be in range, into triangles. Where there is no ear, a
 /// corner is cut off all the same, so that n corners always give n - 2 triangles.
 pub(super) fn triangulate(corners: &[u32], points: &[Vec3]) -> Vec<[u32; 3]> {
+    let mut triangles = Vec::new();
+    add(corners, points, &mut triangles);
+    triangles
+}
+
+/// As [`triangulate`], adding to triangles.
+pub(super) fn add(corners: &[u32], points: &[Vec3], triangles: &mut Vec<[u32; 3]>) {
     match corners {
-        [] | [_] | [_, _] => Vec::new(),
-        [a, b, c] => vec![[*a, *b, *c]],
-        _ => {
+        [] | [_] | [_, _] => {}
+        [a, b, c] => triangles.push([*a, *b, *c]),
+        [others @ .., last] => {
             let normal = normal(corners, points);
             if is_seen_from_last(corners, points, normal) {
-                fan(corners)
+                triangles.extend(others.windows(2).map(|edge| [*last, edge[0], edge[1]]));
             } else {
-                Ears::new(corners, points, normal).cut()
+                triangles.extend(Ears::new(corners, points, normal).cut());
             }
         }
     }
@@ -32,17 +39,9 @@ pub(super) fn triangulate(corners: &[u32], points: &[Vec3]) -> Vec<[u32; 3]> {
 
 /// Twice the vector area (Newell).
 fn normal(corners: &[u32], points: &[Vec3]) -> Vec3 {
-    let origin = points[corners[0] as usize];
-    let relative = |i: usize| sub(points[corners[i % corners.len()] as usize], origin);
-    (1..corners.len())
-        .map(|i| cross(relative(i), relative(i + 1)))
-        .fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
-}
-
-/// The triangles of the last corner with each edge that does not meet it.
-fn fan(corners: &[u32]) -> Vec<[u32; 3]> {
-    let (last, others) = (corners[corners.len() - 1], &corners[..corners.len() - 1]);
-    others.windows(2).map(|edge| [last, edge[0], edge[1]]).collect()
+    let relative = |i: u32| sub(points[i as usize], points[corners[0] as usize]);
+    let areas = corners[1..].windows(2).map(|edge| cross(relative(edge[0]), relative(edge[1])));
+    areas.fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
 }
 
 /// Whether the fan does not fold: each of its triangles turns left, and none lies beyond the line of the first edge,

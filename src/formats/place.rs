@@ -1,0 +1,24 @@
+//! Places in files, for messages.
+
+/// Where in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A line of text, from 1.
+    Line(usize),
+    /// A byte, from 0.
+    Byte(usize),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+        }
+    }
+}
+
+/// A word of a file as it may be shown: short, printable.
+pub(super) fn shown(word: &[u8]) -> String {
+    String::from_utf8_lossy(&word[..word.len().min(40)]).escape_debug().to_string()
+}

@@ -1,0 +1,187 @@
+//! Binary values of a PLY file.
+
+use super::header::{Element, Property, Scalar};
+use super::values::{Bad, Values, whole};
+use crate::formats::place::Place;
+
+/// Bytes of values.
+#[derive(Clone, Copy)]
+pub struct Binary<'a> {
+    rest: &'a [u8],
+    /// Where they end in the file.
+    end: usize,
+    big: bool,
+}
+
+impl<'a> Binary<'a> {
+    /// The values of a file from a byte on.
+    pub fn new(file: &'a [u8], begin: usize, big: bool) -> Self {
+        Self { rest: &file[begin..], end: file.len(), big }
+    }
+
+    fn take(&mut self, bytes: u64) -> Result<&'a [u8], Bad> {
+        let (taken, rest) = usize::try_from(bytes).ok().and_then(|n| self.rest.split_at_checked(n)).ok_or(Bad::End)?;
+        self.rest = rest;
+        Ok(taken)
+    }
+
+    /// The next bytes, the lowest first.
+    #[inline]
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], Bad> {
+        let (array, rest) = self.rest.split_first_chunk().ok_or(Bad::End)?;
+        self.rest = rest;
+        Ok(ordered(*array, self.big))
+    }
+
+    /// All records of an element without lists.
+    pub fn table(&mut self, element: &Element) -> Option<Table<'a>> {
+        let stride = element.stride().filter(|s| *s > 0)?;
+        let begin = self.end - self.rest.len();
+        let bytes = self.take(element.count.checked_mul(stride as u64)?).ok()?;
+        Some(Table { bytes, stride, begin, big: self.big })
+    }
+
+    /// Adds the triangles of as many faces as are plain: whose list has three indices in range. Gives how many.
+    pub fn triangles(&mut self, plain: Plain, most: u64, triangles: &mut Vec<[u32; 3]>) -> u64 {
+        let before = triangles.len();
+        let most = usize::try_from(most).unwrap_or(usize::MAX);
+        let records = self.rest.chunks_exact(plain.before + LIST + plain.after).take(most);
+        let (big, bytes) = (self.big, |record: &[u8], at: usize| -> [u8; 4] {
+            [record[at], record[at + 1], record[at + 2], record[at + 3]]
+        });
+        for record in records {
+            let list = &record[plain.before..plain.before + LIST];
+            let triangle = [1, 5, 9].map(|at| u32::from_le_bytes(ordered(bytes(list, at), big)));
+            if list[0] != 3 || triangle.iter().any(|i| *i >= plain.points) {
+                break;
+            }
+            triangles.push(triangle);
+        }
+        let found = triangles.len() - before;
+        self.rest = &self.rest[found * (plain.before + LIST + plain.after)..];
+        found as u64
+    }
+}
+
+/// Bytes of a list of three indices.
+const LIST: usize = 13;
+
+/// Faces with one list of 32-bit indices after a number of one byte, and nothing else of unknown size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plain {
+    before: usize,
+    after: usize,
+    /// Points that there are: indices are below.
+    points: u32,
+}
+
+impl Plain {
+    /// Whether the faces of an element can be plain, with their list in a property.
+    pub fn new(element: &Element, list: usize, points: usize) -> Option<Self> {
+        let property = &element.properties[list];
+        let lists = [(Some(Scalar::U8), Scalar::I32), (Some(Scalar::U8), Scalar::U32)];
+        let size =
+            |of: &[Property]| -> Option<usize> { of.iter().map(|p| p.count.is_none().then(|| p.scalar.size())).sum() };
+        let (before, after) = (size(&element.properties[..list])?, size(&element.properties[list + 1..])?);
+        // Indices below 2^31 are the same in both types.
+        let points = u32::try_from(points.min(i32::MAX as usize)).ok()?;
+        lists.contains(&(property.count, property.scalar)).then_some(Self { before, after, points })
+    }
+}
+
+/// Records of equal size.
+pub struct Table<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    begin: usize,
+    big: bool,
+}
+
+impl Table<'_> {
+    /// Where a record begins in the file.
+    pub fn place(&self, record: usize) -> Place {
+        Place::Byte(self.begin + record * self.stride)
+    }
+
+    /// Three values of each record, at these bytes of it.
+    pub fn vectors(&self, columns: [(usize, Scalar); 3]) -> Vec<[f64; 3]> {
+        let at = columns.map(|c| c.0);
+        match columns.map(|c| c.1) {
+            [Scalar::F32, Scalar::F32, Scalar::F32] => self.decode(at, |b| f64::from(f32::from_le_bytes(b))),
+            [Scalar::F64, Scalar::F64, Scalar::F64] => self.decode(at, f64::from_le_bytes),
+            _ => {
+                let value = |record: &[u8], (at, scalar): (usize, Scalar)| {
+                    let mut value = Binary { rest: &record[at..], end: 0, big: self.big };
+                    // The record is whole, so there is a value.
+                    value.float(scalar).unwrap_or(f64::NAN)
+                };
+                self.bytes.chunks_exact(self.stride).map(|record| columns.map(|c| value(record, c))).collect()
+            }
+        }
+    }
+
+    fn decode<const N: usize>(&self, at: [usize; 3], value: impl Fn([u8; N]) -> f64) -> Vec<[f64; 3]> {
+        let array = |record: &[u8], at: usize| std::array::from_fn(|i| record[at + i]);
+        let records = self.bytes.chunks_exact(self.stride);
+        if self.big {
+            records.map(|record| at.map(|at| value(ordered(array(record, at), true)))).collect()
+        } else {
+            records.map(|record| at.map(|at| value(array(record, at)))).collect()
+        }
+    }
+}
+
+/// Bytes with the lowest first.
+#[inline]
+fn ordered<const N: usize>(mut bytes: [u8; N], big: bool) -> [u8; N] {
+    if big {
+        bytes.reverse();
+    }
+    bytes
+}
+
+impl<'a> Values<'a> for Binary<'a> {
+    fn place(&self) -> Place {
+        Place::Byte(self.end - self.rest.len())
+    }
+
+    fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
+    #[inline]
+    fn float(&mut self, scalar: Scalar) -> Result<f64, Bad> {
+        match scalar {
+            Scalar::F32 => self.array().map(|b| f64::from(f32::from_le_bytes(b))),
+            Scalar::F64 => self.array().map(f64::from_le_bytes),
+            _ => self.integer(scalar).map(|i| i as f64),
+        }
+    }
+
+    #[inline]
+    fn integer(&mut self, scalar: Scalar) -> Result<i64, Bad> {
+        match scalar {
+            Scalar::I8 => self.array().map(|b| i64::from(i8::from_le_bytes(b))),
+            Scalar::U8 => self.array().map(|b| i64::from(u8::from_le_bytes(b))),
+            Scalar::I16 => self.array().map(|b| i64::from(i16::from_le_bytes(b))),
+            Scalar::U16 => self.array().map(|b| i64::from(u16::from_le_bytes(b))),
+            Scalar::I32 => self.array().map(|b| i64::from(i32::from_le_bytes(b))),
+            Scalar::U32 => self.array().map(|b| i64::from(u32::from_le_bytes(b))),
+            Scalar::F32 | Scalar::F64 => self.float(scalar).and_then(whole),
+        }
+    }
+
+    #[inline]
+    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), Bad> {
+        let bytes = count.checked_mul(scalar.size() as u64).ok_or(Bad::End)?;
+        self.take(bytes).map(|_| ())
+    }
+
+    fn end_record(&mut self) -> Result<(), Bad> {
+        Ok(())
+    }
+
+    fn binary(&mut self) -> Option<&mut Binary<'a>> {
+        Some(self)
+    }
+}

@@ -1,0 +1,271 @@
+//! What follows the header of a PLY file: points, and faces and strips as triangles.
+
+use super::PlyError;
+use super::binary::Plain;
+use super::header::{Element, Header, Property};
+use super::values::{Bad, Values};
+use crate::formats::place::shown;
+use crate::formats::{Limits, Notes, polygon};
+use pipeline::space::Vec3;
+
+/// Names of the list of corners.
+const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// In strips: the next corner begins another one.
+const RESTART: u32 = u32::MAX;
+
+/// Points and triangles.
+pub struct Body<'h> {
+    limits: &'h Limits,
+    notes: &'h mut Notes,
+    pub points: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl<'h> Body<'h> {
+    /// Reads all elements. Those that name points wait until there are some.
+    pub fn read<'a>(
+        header: &Header,
+        mut values: impl Values<'a>,
+        limits: &'h Limits,
+        notes: &'h mut Notes,
+    ) -> Result<Self, PlyError> {
+        let mut body = Self { limits, notes, points: Vec::new(), triangles: Vec::new() };
+        body.check(header, values.rest().len())?;
+        let mut waiting = Vec::new();
+        let mut points = false;
+        for element in &header.elements {
+            match element.name.as_str() {
+                "vertex" => {
+                    body.points = read_points(element, &mut values)?;
+                    points = true;
+                }
+                "face" | "tristrips" if points => body.surface(element, &mut values)?,
+                "face" | "tristrips" => {
+                    waiting.push((element, values));
+                    skip(element, &mut values)?;
+                }
+                name => {
+                    body.notes.skip(name, usize::try_from(element.count).unwrap_or(usize::MAX));
+                    skip(element, &mut values)?;
+                }
+            }
+        }
+        end(values)?;
+        waiting.into_iter().try_for_each(|(element, mut values)| body.surface(element, &mut values))?;
+        Ok(body)
+    }
+
+    /// Whether the declared counts fit the bytes and the limits.
+    fn check(&self, header: &Header, size: usize) -> Result<(), PlyError> {
+        if !header.elements.iter().any(|e| e.name == "vertex") {
+            return Err(PlyError::NoElement);
+        }
+        let mut left = size as u64;
+        for element in &header.elements {
+            let (name, count, line) = (element.name.clone(), element.count, element.line);
+            // The last value of a text needs no blank after it.
+            let needed = element.needed(header.encoding);
+            left = left
+                .checked_add(1)
+                .and_then(|l| l.checked_sub(needed))
+                .map(|l| l.saturating_sub(1))
+                .ok_or(PlyError::Count { element: name.clone(), count, needed, left, line })?;
+            if count > self.limits.elements {
+                return Err(PlyError::TooMany { what: format!("{name} elements"), count, limit: self.limits.elements });
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads faces or strips.
+    fn surface<'a>(&mut self, element: &Element, values: &mut impl Values<'a>) -> Result<(), PlyError> {
+        let list = element.property(&CORNERS).filter(|p| element.properties[*p].count.is_some());
+        let Some(list) = list else {
+            if element.count == 0 {
+                return Ok(());
+            }
+            let (element, line) = (element.name.clone(), element.line);
+            return Err(PlyError::NoProperty { element, property: "list vertex_indices", line });
+        };
+        let strips = element.name == "tristrips";
+        let plain = Plain::new(element, list, self.points.len()).filter(|_| !strips);
+        let mut corners = Vec::new();
+        let mut number = 0;
+        while number < element.count {
+            if let Some((binary, plain)) = values.binary().zip(plain) {
+                number += binary.triangles(plain, element.count - number, &mut self.triangles);
+                if number == element.count {
+                    break;
+                }
+            }
+            self.corners(element, list, values, &mut corners).map_err(|bad| told(bad, element, number, values))?;
+            if strips {
+                self.strip(&corners)
+            } else {
+                self.face(&corners)
+            }
+            self.few_enough()?;
+            number += 1;
+        }
+        Ok(())
+    }
+
+    fn few_enough(&self) -> Result<(), PlyError> {
+        let (count, limit) = (self.triangles.len() as u64, self.limits.elements);
+        let error = || PlyError::TooMany { what: "triangles".to_owned(), count, limit };
+        (count <= limit).then_some(()).ok_or_else(error)
+    }
+
+    /// Reads a record: the corners that it lists.
+    fn corners<'a>(
+        &self,
+        element: &Element,
+        list: usize,
+        values: &mut impl Values<'a>,
+        corners: &mut Vec<u32>,
+    ) -> Result<(), Bad> {
+        corners.clear();
+        for (p, property) in element.properties.iter().enumerate() {
+            let length = length(property, values)?;
+            if p != list {
+                values.skip(property.scalar, length)?;
+                continue;
+            }
+            for _ in 0..length {
+                corners.push(self.corner(values.integer(property.scalar)?, element)?);
+            }
+        }
+        values.end_record()
+    }
+
+    fn corner(&self, index: i64, element: &Element) -> Result<u32, Bad> {
+        let restart = index == -1 && element.name == "tristrips";
+        let found = u32::try_from(index).ok().filter(|i| (*i as usize) < self.points.len());
+        let points = self.points.len();
+        found
+            .or(restart.then_some(RESTART))
+            .ok_or_else(|| Bad::Value(format!("vertex {index} is named, but there are {points} (counted from 0)")))
+    }
+
+    fn face(&mut self, corners: &[u32]) {
+        match corners {
+            [] | [_] | [_, _] => self.notes.skip("face with fewer than three corners", 1),
+            [a, b, c] => self.triangles.push([*a, *b, *c]),
+            _ => {
+                self.notes.polygons += 1;
+                polygon::add(corners, &self.points, &mut self.triangles);
+            }
+        }
+    }
+
+    /// Every other triangle of a strip has its first two corners exchanged. Triangles that name a corner twice only
+    /// lead the strip on.
+    fn strip(&mut self, corners: &[u32]) {
+        for strip in corners.split(|c| *c == RESTART) {
+            for (i, corner) in strip.windows(3).enumerate() {
+                let [a, b, c] = [corner[i % 2], corner[1 - i % 2], corner[2]];
+                if a != b && b != c && c != a {
+                    self.triangles.push([a, b, c]);
+                }
+            }
+        }
+    }
+}
+
+/// What is wrong with a value, with its place.
+fn told<'a>(bad: Bad, element: &Element, number: u64, values: &impl Values<'a>) -> PlyError {
+    let (element, count, place) = (element.name.clone(), element.count, values.place());
+    match bad {
+        Bad::End => PlyError::Truncated { element, number, count, place },
+        Bad::Value(problem) => PlyError::Value { element, number, problem, place },
+    }
+}
+
+/// How many values a property has here, all of which have room in what is left.
+fn length<'a>(property: &Property, values: &mut impl Values<'a>) -> Result<u64, Bad> {
+    let Some(count) = property.count else { return Ok(1) };
+    let length = values.integer(count)?;
+    u64::try_from(length).map_err(|_| Bad::Value(format!("a list has the length {length}")))
+}
+
+/// Passes over all records of an element.
+fn skip<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<(), PlyError> {
+    let passed = values.binary().and_then(|binary| binary.table(element)).is_some();
+    if passed || element.properties.is_empty() {
+        return Ok(());
+    }
+    for number in 0..element.count {
+        skip_record(element, values).map_err(|bad| told(bad, element, number, values))?;
+    }
+    Ok(())
+}
+
+fn skip_record<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<(), Bad> {
+    for property in &element.properties {
+        let length = length(property, values)?;
+        values.skip(property.scalar, length)?;
+    }
+    values.end_record()
+}
+
+/// The positions of x, y and z.
+fn axes(element: &Element) -> Result<[usize; 3], PlyError> {
+    let mut axes = [0; 3];
+    for (axis, property) in axes.iter_mut().zip(["x", "y", "z"]) {
+        let scalar = element.property(&[property]).filter(|p| element.properties[*p].count.is_none());
+        let error = || PlyError::NoProperty { element: element.name.clone(), property, line: element.line };
+        *axis = scalar.ok_or_else(error)?;
+    }
+    Ok(axes)
+}
+
+/// Reads all points.
+fn read_points<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<Vec<Vec3>, PlyError> {
+    let axes = axes(element)?;
+    let not_finite = |point: &Vec3, vertex, place| {
+        let value = point.iter().find(|c| !c.is_finite()).map(f64::to_string);
+        value.map_or(Ok(()), |value| Err(PlyError::NotFinite { vertex, value, place }))
+    };
+    if let Some(table) = values.binary().and_then(|binary| binary.table(element)) {
+        let offset = |axis: usize| element.properties[..axis].iter().map(|p| p.scalar.size()).sum();
+        let points = table.vectors(axes.map(|a| (offset(a), element.properties[a].scalar)));
+        let broken = points.iter().position(|p| p.iter().any(|c| !c.is_finite()));
+        broken.map_or(Ok(()), |v| not_finite(&points[v], v as u64, table.place(v)))?;
+        return Ok(points);
+    }
+    // Each point takes at least three bytes, which were counted.
+    let mut points = Vec::with_capacity(usize::try_from(element.count).unwrap_or(0));
+    for number in 0..element.count {
+        let place = values.place();
+        let point = read_point(element, axes, values).map_err(|bad| told(bad, element, number, values))?;
+        let place = if values.binary().is_some() { place } else { values.place() };
+        not_finite(&point, number, place)?;
+        points.push(point);
+    }
+    Ok(points)
+}
+
+fn read_point<'a>(element: &Element, axes: [usize; 3], values: &mut impl Values<'a>) -> Result<Vec3, Bad> {
+    let mut point = [0.0; 3];
+    for (p, property) in element.properties.iter().enumerate() {
+        match axes.iter().position(|a| *a == p) {
+            Some(axis) => point[axis] = values.float(property.scalar)?,
+            None => {
+                let length = length(property, values)?;
+                values.skip(property.scalar, length)?;
+            }
+        }
+    }
+    values.end_record()?;
+    Ok(point)
+}
+
+/// Nothing but blanks may follow the last record.
+fn end<'a>(values: impl Values<'a>) -> Result<(), PlyError> {
+    let rest = values.rest().trim_ascii();
+    if rest.is_empty() {
+        return Ok(());
+    }
+    Err(PlyError::Trailing { bytes: rest.len(), begins: shown(rest), place: values.place() })
+}

@@ -1,0 +1,188 @@
+//! PLY 1.0, ASCII and binary.
+//!
+//! Points are the element `vertex` with `x`, `y`, `z`; faces are the element `face` or `tristrips` with the list
+//! `vertex_indices` or `vertex_index`. All types are read everywhere, elements may come in any order, and other
+//! elements and properties are passed over. Polygons are cut into triangles; the triangles of a strip turn alternately,
+//! and -1 begins another strip.
+
+mod binary;
+mod body;
+mod header;
+mod values;
+
+use super::place::Place;
+use super::words::Words;
+use super::{Content, Notes, ReadError, Source};
+use crate::outcome::Code;
+use binary::Binary;
+use body::Body;
+use header::{Encoding, Header};
+use pipeline::mesh::TriangleSoup;
+use values::Text;
+
+/// Why bytes are no PLY file.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlyError {
+    /// The first line is another.
+    #[error("the file begins with \"{begins}\", not with a line \"ply\": it is no PLY file; export it again")]
+    NotPly {
+        /// What it begins with.
+        begins: String,
+    },
+    /// A line of the header makes no sense.
+    #[error("line {line}: {problem}; correct the header or export the file again")]
+    Header {
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The header does not end.
+    #[error(
+        "there is no line \"end_header\" up to line {line} (headers of up to {most} bytes are read); the file was cut off: copy or export it again"
+    )]
+    HeaderEnds {
+        /// The last line.
+        line: usize,
+        /// Bytes of a header, at most.
+        most: usize,
+    },
+    /// There are no points.
+    #[error("the header declares no element \"vertex\"; export the file again, as a mesh")]
+    NoElement,
+    /// An element lacks what it is for.
+    #[error("line {line}: element {element} has no property \"{property}\"; export the file again, as a mesh")]
+    NoProperty {
+        /// The element.
+        element: String,
+        /// What it lacks.
+        property: &'static str,
+        /// The line that declares the element.
+        line: usize,
+    },
+    /// There are fewer bytes than the declared elements take.
+    #[error(
+        "line {line}: the header declares {count} of element {element} ({needed} bytes at least), but {left} bytes are left for them; the file was cut off or its header is wrong: copy or export it again"
+    )]
+    Count {
+        /// The element.
+        element: String,
+        /// How many are declared.
+        count: u64,
+        /// Bytes they need at least.
+        needed: u64,
+        /// Bytes there are, behind those that the elements before need.
+        left: u64,
+        /// The line of the declaration.
+        line: usize,
+    },
+    /// There are more than may be.
+    #[error("{count} {what} exceed the limit of {limit}; split the file, or raise the limit")]
+    TooMany {
+        /// What there is too much of.
+        what: String,
+        /// How many there are.
+        count: u64,
+        /// How many may be.
+        limit: u64,
+    },
+    /// The file ends in the middle.
+    #[error(
+        "{place}: the file ends in {element} {number} (from 0) of {count} that its header declares; it was cut off or its header is wrong: copy or export it again"
+    )]
+    Truncated {
+        /// The element.
+        element: String,
+        /// Its number, from 0.
+        number: u64,
+        /// How many are declared.
+        count: u64,
+        /// Where the file ends.
+        place: Place,
+    },
+    /// A value is not what it should be.
+    #[error("{place}: {problem}, in {element} {number} (from 0); correct the header or export the file again")]
+    Value {
+        /// The element.
+        element: String,
+        /// Its number, from 0.
+        number: u64,
+        /// What is wrong.
+        problem: String,
+        /// Where.
+        place: Place,
+    },
+    /// A coordinate is not a number, or infinite.
+    #[error("{place}: vertex {vertex} (from 0) has the coordinate {value}; repair the exporting model")]
+    NotFinite {
+        /// The vertex, from 0.
+        vertex: u64,
+        /// The value.
+        value: String,
+        /// Where the vertex is.
+        place: Place,
+    },
+    /// There is more than the header declares.
+    #[error(
+        "{place}: {bytes} bytes (\"{begins}\") follow all that the header declares; correct its counts, cut the file off there, or export it again"
+    )]
+    Trailing {
+        /// How many bytes.
+        bytes: usize,
+        /// What they begin with.
+        begins: String,
+        /// Where the last record ends.
+        place: Place,
+    },
+}
+
+impl PlyError {
+    pub(super) fn code(&self) -> Code {
+        match self {
+            Self::NotPly { .. } | Self::Header { .. } | Self::HeaderEnds { .. } => Code::Malformed,
+            Self::NoElement | Self::NoProperty { .. } | Self::Value { .. } => Code::Malformed,
+            Self::Count { .. } | Self::Truncated { .. } | Self::Trailing { .. } => Code::CountMismatch,
+            Self::TooMany { .. } => Code::TooLarge,
+            Self::NotFinite { .. } => Code::NotFinite,
+        }
+    }
+
+    pub(super) fn place(&self) -> Option<String> {
+        match self {
+            Self::NotPly { .. } => Some(Place::Line(1).to_string()),
+            Self::NoElement | Self::TooMany { .. } => None,
+            Self::Header { line, .. }
+            | Self::HeaderEnds { line, .. }
+            | Self::NoProperty { line, .. }
+            | Self::Count { line, .. } => Some(Place::Line(*line).to_string()),
+            Self::Truncated { place, .. }
+            | Self::Value { place, .. }
+            | Self::NotFinite { place, .. }
+            | Self::Trailing { place, .. } => Some(place.to_string()),
+        }
+    }
+}
+
+/// Reads a PLY file.
+pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
+    let header = Header::read(source.bytes)?;
+    let mut notes = Notes::new(match header.encoding {
+        Encoding::Ascii => "PLY, ASCII",
+        Encoding::Little => "PLY, binary, little-endian",
+        Encoding::Big => "PLY, binary, big-endian",
+    });
+    let body = match header.encoding {
+        Encoding::Ascii => {
+            let text = Text(Words::new(&source.bytes[header.end..], header.lines + 1));
+            Body::read(&header, text, source.limits, &mut notes)?
+        }
+        encoding => {
+            let binary = Binary::new(source.bytes, header.end, encoding == Encoding::Big);
+            Body::read(&header, binary, source.limits, &mut notes)?
+        }
+    };
+    Ok(Content { soup: TriangleSoup::new(body.points, body.triangles)?, notes })
+}
+
+#[cfg(test)]
+mod tests;
