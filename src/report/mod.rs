@@ -132,7 +132,7 @@ pub struct Counts {
     pub orientable: bool,
     /// Edges of three or more triangles.
     pub nonmanifold_edges: usize,
-    /// Vertices where sheets touch.
+    /// Vertices where sheets touch that share no edge there, once for each sheet beyond the first.
     pub nonmanifold_vertices: usize,
     /// Edges whose triangles disagree about the direction.
     pub inconsistent_edges: usize,

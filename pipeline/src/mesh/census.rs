@@ -25,7 +25,7 @@ pub struct Census {
     pub orientable: bool,
     /// Edges at which three or more triangles meet.
     pub nonmanifold_edges: usize,
-    /// Vertices at which several sheets touch that share no edge there.
+    /// Vertices at which sheets touch that share no edge there: once for each sheet beyond the first.
     pub nonmanifold_vertices: usize,
     /// Edges whose two triangles disagree about the direction.
     pub inconsistent_edges: usize,
@@ -161,12 +161,12 @@ impl Census {
     }
 }
 
-/// The number of vertices, and of those with several umbrellas.
+/// The number of vertices, and how many umbrellas there are beyond one for each.
 fn count_vertices(umbrella_vertices: &[VertexId]) -> (usize, usize) {
-    let mut sorted = umbrella_vertices.to_vec();
-    sorted.sort_unstable();
-    let runs = sorted.chunk_by(|a, b| a == b);
-    runs.fold((0, 0), |(all, several), run| (all + 1, several + usize::from(run.len() > 1)))
+    let mut vertices = umbrella_vertices.to_vec();
+    vertices.sort_unstable();
+    vertices.dedup();
+    (vertices.len(), umbrella_vertices.len() - vertices.len())
 }
 
 /// The number of parts connected through edges.

@@ -120,13 +120,14 @@ struct Draft {
 pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Error> {
     let (mut draft, welded) = weld::weld(soup);
     let mut report = Report { welded, ..Report::default() };
+    let used = draft.count_used();
     report.degenerate_triangles = draft.drop_degenerate();
     if draft.triangles.is_empty() {
         return Err(Error::OnlyDegenerate { triangles: soup.triangles().len() });
     }
     let mut edges = EdgeTable::new(&draft.triangles);
     let raw = Census::new(&draft.triangles, &edges);
-    report.unreferenced_points = draft.points.len() - raw.vertices;
+    report.unreferenced_points = draft.points.len() - used;
     report.duplicate_triangles = draft.drop_duplicates();
     edges = renewed(edges, report.duplicate_triangles.count > 0, &draft.triangles);
     draft.close_cracks(&edges, settings.weld, &mut report);
@@ -137,7 +138,9 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
         edges = renewed(edges, report.flipped_triangles.count > 0, &draft.triangles);
     }
     let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0);
-    Ok(Repaired { mesh: draft.into_mesh(edges, known, &mut report), raw, report })
+    let mesh = draft.into_mesh(edges, known, &mut report);
+    // As read: vertices of degenerate triangles count, though these do not.
+    Ok(Repaired { mesh, raw: Census { vertices: used, ..raw }, report })
 }
 
 /// The edges of `triangles`: found again only where the triangles `changed`.
@@ -146,6 +149,13 @@ fn renewed(edges: EdgeTable, changed: bool, triangles: &[[VertexId; 3]]) -> Edge
 }
 
 impl Draft {
+    /// The number of points that triangles use.
+    fn count_used(&self) -> usize {
+        let mut used = vec![false; self.points.len()];
+        self.triangles.iter().flatten().for_each(|v| used[v.index()] = true);
+        used.iter().filter(|u| **u).count()
+    }
+
     /// Removes triangles with two equal vertices.
     fn drop_degenerate(&mut self) -> Found {
         let whole = |t: &[VertexId; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
