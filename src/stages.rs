@@ -1,6 +1,6 @@
 //! What each stage does with an input: values in, values out. The threads are in [`crate::conveyor`].
 
-use crate::formats::{self, Beside, Content, Kind, Source, vtm, vtp, vtu};
+use crate::formats::{self, Beside, Content, Kind, READ, Source, vtm, vtp, vtu};
 use crate::hand_off;
 use crate::job::Stopped;
 use crate::outcome::{Code, Reason, Status};
@@ -73,18 +73,16 @@ pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -
         }
         Kind::OtherMesh(e) => refuse(
             Code::UnsupportedFormat,
-            format!("this version reads .stl and .obj, not .{e}; convert the file to one of these"),
+            format!("this version does not read .{e}; convert the file to one of {READ}"),
         ),
-        Kind::NoMesh => {
-            refuse(Code::NotAMesh, "a file of this name holds no mesh; name an .stl or .obj file".to_owned())
-        }
+        Kind::NoMesh => refuse(Code::NotAMesh, format!("a file of this name holds no mesh; name one of {READ}")),
         Kind::Unknown(e) if e.is_empty() => refuse(
             Code::UnknownExtension,
-            "the file name has no extension; rename the file to end in .stl or .obj, whichever it is".to_owned(),
+            format!("the file name has no extension; rename the file to end in one of {READ}, whichever it is"),
         ),
         Kind::Unknown(e) => refuse(
             Code::UnknownExtension,
-            format!("the extension .{e} is not known; planish reads .stl and .obj: rename or convert the file"),
+            format!("the extension .{e} is not known; rename or convert the file to one of {READ}"),
         ),
     }
 }

@@ -9,6 +9,7 @@ mod obj;
 mod place;
 mod ply;
 mod polygon;
+mod sniff;
 mod stl;
 mod vtk;
 pub mod vtm;
@@ -55,6 +56,9 @@ pub enum Kind {
 
 /// Extensions of meshes in formats that this version does not read.
 const OTHER_MESHES: [&str; 2] = ["msh", "off"];
+
+/// The extensions that planish reads, as people are told.
+pub const READ: &str = ".stl .obj .ply .gltf .glb .vtk .vtu .vtp";
 
 /// Extensions of what lies beside meshes.
 const NO_MESHES: [&str; 13] =
@@ -131,7 +135,8 @@ fn soup_reason(error: &SoupError) -> (Code, Option<String>) {
     }
 }
 
-/// Reads the bytes of a file.
+/// Reads the bytes of a file, which its name says to be in this format; where the bytes say otherwise beyond doubt, they
+/// are believed.
 ///
 /// # Errors
 /// [`ReadError`], with the place and what to do.
@@ -140,7 +145,7 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
     if bytes.is_empty() {
         return Err(ReadError::Empty);
     }
-    match format {
+    match sniff::sniff(bytes).unwrap_or(format) {
         Format::Stl => stl::read(bytes),
         Format::Obj => obj::read(bytes),
         Format::Gltf => gltf::read(source),

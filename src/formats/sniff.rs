@@ -1,0 +1,58 @@
+//! What the first bytes of a file say about its format, where that is beyond doubt: files are given wrong extensions.
+
+use super::Format;
+
+/// How far a word that decides is looked for.
+const FAR: usize = 1024;
+
+/// The format that these bytes are in, whatever the file is called; none where they do not say so.
+pub(super) fn sniff(bytes: &[u8]) -> Option<Format> {
+    let head = &bytes[..bytes.len().min(FAR)];
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    let has = |word: &str| text.windows(word.len()).any(|w| w.eq_ignore_ascii_case(word.as_bytes()));
+    match text {
+        _ if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") => Some(Format::Ply),
+        _ if text.starts_with(b"# vtk DataFile") => Some(Format::Vtk),
+        _ if text.starts_with(b"glTF") => Some(Format::Gltf),
+        _ if text.starts_with(b"{") && has("\"asset\"") => Some(Format::Gltf),
+        _ if text.starts_with(b"<") && has("<VTKFile") && has("UnstructuredGrid") => Some(Format::Vtu),
+        _ if text.starts_with(b"<") && has("<VTKFile") && has("PolyData") => Some(Format::Vtp),
+        // Binary files may begin with the word, too.
+        _ if is_word(text, "solid") && has("facet") && has("vertex") && !text.contains(&0) => Some(Format::Stl),
+        _ => None,
+    }
+}
+
+/// Whether a text begins with this word, in any case.
+fn is_word(text: &[u8], word: &str) -> bool {
+    let end = text.get(word.len()).is_none_or(u8::is_ascii_whitespace);
+    end && text.get(..word.len()).is_some_and(|w| w.eq_ignore_ascii_case(word.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_is_beyond_doubt_is_recognised() {
+        let cases: [(&[u8], Option<Format>); 14] = [
+            (b"ply\nformat ascii 1.0\n", Some(Format::Ply)),
+            (b"# vtk DataFile Version 3.0\n", Some(Format::Vtk)),
+            (b"glTF\x02\0\0\0", Some(Format::Gltf)),
+            (b" {\"asset\": {\"version\": \"2.0\"}}", Some(Format::Gltf)),
+            (b"<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">", Some(Format::Vtp)),
+            (b"<VTKFile type=\"UnstructuredGrid\">", Some(Format::Vtu)),
+            (b"SOLID a\n facet normal 0 0 1\n outer loop\n vertex 0 0 0", Some(Format::Stl)),
+            (b"solid\0\0 facet vertex", None),
+            (b"solids facet vertex", None),
+            (b"v 0 0 0\nv 1 0 0\n", None),
+            (b"plywood", None),
+            (b"{\"a\": 1}", None),
+            (b"<html>", None),
+            (b"", None),
+        ];
+        for (bytes, format) in cases {
+            assert_eq!(sniff(bytes), format, "{}", String::from_utf8_lossy(bytes));
+        }
+    }
+}
