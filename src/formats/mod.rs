@@ -3,6 +3,7 @@
 mod content;
 mod gltf;
 pub mod gmsh;
+mod msh;
 #[cfg(test)]
 mod mutate;
 mod obj;
@@ -39,6 +40,8 @@ pub enum Format {
     Vtp,
     /// Polygon File Format, ASCII or binary.
     Ply,
+    /// MSH of Gmsh, ASCII or binary.
+    Msh,
 }
 
 /// What the name of a file says about it.
@@ -55,10 +58,10 @@ pub enum Kind {
 }
 
 /// Extensions of meshes in formats that this version does not read.
-const OTHER_MESHES: [&str; 2] = ["msh", "off"];
+const OTHER_MESHES: [&str; 1] = ["off"];
 
 /// The extensions that planish reads, as people are told.
-pub const READ: &str = ".stl .obj .ply .gltf .glb .vtk .vtu .vtp";
+pub const READ: &str = ".stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh";
 
 /// Extensions of what lies beside meshes.
 const NO_MESHES: [&str; 13] =
@@ -78,6 +81,7 @@ pub fn kind(path: &Path) -> Kind {
         "vtu" | "pvtu" => Kind::Mesh(Format::Vtu),
         "vtp" | "pvtp" | "vtm" => Kind::Mesh(Format::Vtp),
         "ply" => Kind::Mesh(Format::Ply),
+        "msh" => Kind::Mesh(Format::Msh),
         e if OTHER_MESHES.contains(&e) => Kind::OtherMesh(extension),
         e if NO_MESHES.contains(&e) => Kind::NoMesh,
         _ => Kind::Unknown(extension),
@@ -105,6 +109,9 @@ pub enum ReadError {
     /// Not a PLY file.
     #[error(transparent)]
     Ply(#[from] ply::PlyError),
+    /// Not an MSH file.
+    #[error(transparent)]
+    Msh(#[from] msh::MshError),
     /// What was read makes no sense.
     #[error(transparent)]
     Soup(#[from] SoupError),
@@ -120,6 +127,7 @@ impl ReadError {
             Self::Gltf(e) => (e.code(), e.place()),
             Self::Vtk(e) => (e.code(), e.place()),
             Self::Ply(e) => (e.code(), e.place()),
+            Self::Msh(e) => (e.code(), e.place()),
             Self::Soup(e) => soup_reason(e),
         };
         Reason { code, message: self.to_string(), place }
@@ -151,6 +159,7 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
         Format::Gltf => gltf::read(source),
         Format::Vtk | Format::Vtu | Format::Vtp => vtk::read(source),
         Format::Ply => ply::read(source),
+        Format::Msh => msh::read(source),
     }
 }
 
@@ -171,6 +180,7 @@ mod tests {
         assert_eq!(kind(Path::new("a/Part.STL")), Kind::Mesh(Format::Stl));
         assert_eq!(kind(Path::new("scan.obj")), Kind::Mesh(Format::Obj));
         assert_eq!(kind(Path::new("scan.ply")), Kind::Mesh(Format::Ply));
+        assert_eq!(kind(Path::new("Part.Msh")), Kind::Mesh(Format::Msh));
         assert_eq!(kind(Path::new("scan.off")), Kind::OtherMesh("off".to_owned()));
         for beside in ["scan.mtl", ".scan.stl", "scan.stl.part", "scan.obj~", "a.png"] {
             assert_eq!(kind(Path::new(beside)), Kind::NoMesh, "{beside}");

@@ -39,6 +39,12 @@ impl<'a> Words<'a> {
         (!word.is_empty()).then_some(word)
     }
 
+    /// Passes over so many bytes, which must end at a blank or the end.
+    pub fn advance(&mut self, bytes: usize) {
+        let end = self.rest.len() - bytes;
+        while self.rest.len() > end && self.next().is_some() {}
+    }
+
     /// The next word, if the line goes on.
     #[inline]
     pub fn next_in_line(&mut self) -> Option<&'a [u8]> {

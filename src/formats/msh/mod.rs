@@ -1,0 +1,365 @@
+//! MSH, the format of Gmsh: versions 2.0 to 2.2 and 4.1, ASCII and binary, in either order of bytes.
+//!
+//! The triangles and quads of all entities together are the surface. Elements of higher order are taken by their
+//! corners: the nodes in the middle of edges and faces are left out and counted. Points, lines and elements of volumes
+//! are counted by kind. The names of physical groups are told; all other sections are passed over.
+
+mod nodes;
+mod sections;
+mod shapes;
+mod surface;
+mod values;
+
+use super::place::{Place, shown};
+use super::words::Words;
+use super::{Content, Limits, Notes, ReadError, Source};
+use crate::outcome::Code;
+use nodes::Nodes;
+use surface::Surface;
+use values::{Binary, Fault, Text, Values};
+
+/// Why bytes are no MSH file.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub enum MshError {
+    /// The first section is another.
+    #[error("the file begins with \"{begins}\", not with \"$MeshFormat\": it is no MSH file; save it again with Gmsh")]
+    NotMsh {
+        /// What it begins with.
+        begins: String,
+    },
+    /// A version that is not read.
+    #[error(
+        "this is version {version} of MSH, and planish reads 2.0 to 2.2 and 4.1: convert the file with \"gmsh FILE -save -save_all -format msh41 -o NEW.msh\""
+    )]
+    Version {
+        /// The version found.
+        version: String,
+    },
+    /// A format line that makes no sense.
+    #[error("line 2: {problem}; save the file again with Gmsh")]
+    Format {
+        /// What is wrong.
+        problem: String,
+    },
+    /// There are fewer bytes than the declared records take.
+    #[error(
+        "{place}: {count} {what} are declared ({needed} bytes at least), but only {left} bytes follow; the file was cut off or the number is wrong: copy or save it again"
+    )]
+    Count {
+        /// Nodes or elements.
+        what: &'static str,
+        /// How many are declared.
+        count: u64,
+        /// Bytes they need at least.
+        needed: u64,
+        /// Bytes there are.
+        left: u64,
+        /// Where they are declared.
+        place: Place,
+    },
+    /// The blocks of a section hold more or fewer records than it declares.
+    #[error("{place}: {count} {what} are declared, but the blocks hold {found}; save the file again with Gmsh")]
+    Sum {
+        /// Nodes or elements.
+        what: &'static str,
+        /// How many are declared.
+        count: u64,
+        /// How many there are, so far at least.
+        found: u64,
+        /// Where that shows.
+        place: Place,
+    },
+    /// There are more than may be.
+    #[error("{count} {what} exceed the limit of {limit}; split the file, or raise the limit")]
+    TooMany {
+        /// Nodes, elements or triangles.
+        what: &'static str,
+        /// How many there are.
+        count: u64,
+        /// How many may be.
+        limit: u64,
+    },
+    /// The file ends in the middle of a section.
+    #[error(
+        "{place}: the file ends in section ${section}; it was cut off or a number in it is wrong: copy or save it again"
+    )]
+    Truncated {
+        /// The section.
+        section: String,
+        /// Where the file ends.
+        place: Place,
+    },
+    /// A section ends in the middle.
+    #[error(
+        "{place}: section ${section} ends before all that it declares is there; correct its numbers or save the file again with Gmsh"
+    )]
+    Short {
+        /// The section.
+        section: String,
+        /// Where it ends.
+        place: Place,
+    },
+    /// A value is not what it should be.
+    #[error("{place}: {problem}, in section ${section}; correct it or save the file again with Gmsh")]
+    Value {
+        /// The section.
+        section: String,
+        /// What is wrong.
+        problem: String,
+        /// Where.
+        place: Place,
+    },
+    /// A section goes on behind its declared records.
+    #[error(
+        "{place}: section ${section} goes on with \"{found}\" behind all that it declares; correct its numbers or save the file again with Gmsh"
+    )]
+    NoEnd {
+        /// The section.
+        section: String,
+        /// What there is in the place of its end.
+        found: String,
+        /// Where.
+        place: Place,
+    },
+    /// A section is missing, or comes too late.
+    #[error("there is no section ${section}{}; save the file again with Gmsh", if *late { " before $Elements" } else { "" })]
+    NoSection {
+        /// The section.
+        section: &'static str,
+        /// Whether elements come without it.
+        late: bool,
+    },
+    /// There are two sections where there may be one.
+    #[error("{place}: there is another section ${section}; split the file, one mesh in each")]
+    SecondSection {
+        /// The section.
+        section: String,
+        /// Where it begins.
+        place: Place,
+    },
+    /// A coordinate is not a number, or infinite.
+    #[error("{place}: node {node} has the coordinate {value}; repair the exporting model")]
+    NotFinite {
+        /// The tag of the node.
+        node: u64,
+        /// The value.
+        value: String,
+        /// Where.
+        place: Place,
+    },
+    /// Two nodes have the same tag.
+    #[error("there are two nodes {node}; renumber the mesh, or save it again with Gmsh")]
+    SameNode {
+        /// The tag.
+        node: u64,
+    },
+    /// An element of a type that is not known.
+    #[error("{place}: {number} is no type of elements that planish knows; save the mesh without them")]
+    NoType {
+        /// The number of the type.
+        number: i64,
+        /// Where.
+        place: Place,
+    },
+    /// An element names a node that does not exist.
+    #[error(
+        "{place}: element {element} names node {node}, and there is none of this tag; save the file again with Gmsh"
+    )]
+    NoNode {
+        /// The tag of the element.
+        element: u64,
+        /// The tag of the node.
+        node: u64,
+        /// Where the nodes of the element are.
+        place: Place,
+    },
+}
+
+impl MshError {
+    pub(super) fn code(&self) -> Code {
+        match self {
+            Self::Count { .. } | Self::Sum { .. } | Self::Truncated { .. } => Code::CountMismatch,
+            Self::Short { .. } | Self::NoEnd { .. } => Code::CountMismatch,
+            Self::TooMany { .. } => Code::TooLarge,
+            Self::NotFinite { .. } => Code::NotFinite,
+            Self::Version { .. } => Code::UnsupportedFormat,
+            _ => Code::Malformed,
+        }
+    }
+
+    pub(super) fn place(&self) -> Option<String> {
+        match self {
+            Self::NotMsh { .. } => Some(Place::Line(1).to_string()),
+            Self::Version { .. } | Self::Format { .. } => Some(Place::Line(2).to_string()),
+            Self::TooMany { .. } | Self::NoSection { .. } => None,
+            Self::SameNode { node } => Some(format!("node {node}")),
+            Self::Count { place, .. }
+            | Self::Sum { place, .. }
+            | Self::Truncated { place, .. }
+            | Self::Short { place, .. }
+            | Self::Value { place, .. }
+            | Self::NoEnd { place, .. }
+            | Self::SecondSection { place, .. }
+            | Self::NotFinite { place, .. }
+            | Self::NoType { place, .. }
+            | Self::NoNode { place, .. } => Some(place.to_string()),
+        }
+    }
+}
+
+/// The versions that are read.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Version {
+    Two,
+    Four,
+}
+
+/// Reads an MSH file.
+pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
+    let mut words = Words::new(source.bytes, 1);
+    let begins = words.next().unwrap_or_default();
+    // Version 1 has no section for the format.
+    if begins == b"$NOD" {
+        return Err(MshError::Version { version: "1".to_owned() }.into());
+    }
+    if begins != b"$MeshFormat" {
+        return Err(MshError::NotMsh { begins: shown(begins) }.into());
+    }
+    let [name, encoding, size] = [words.next(), words.next(), words.next()].map(Option::unwrap_or_default);
+    let version = version(name)?;
+    if size != b"8" {
+        return Err(format_error(format!("numbers of {} bytes are not read, only of 8", shown(size))).into());
+    }
+    let name = shown(name);
+    match encoding {
+        b"0" => body(Text(words), version, source.limits, Notes::new(format!("MSH {name}, ASCII"))),
+        b"1" => {
+            let (values, order) = binary(source.bytes, words)?;
+            body(values, version, source.limits, Notes::new(format!("MSH {name}, binary, {order}")))
+        }
+        other => Err(format_error(format!("\"{}\" is neither 0 (ASCII) nor 1 (binary)", shown(other))).into()),
+    }
+}
+
+fn format_error(problem: String) -> MshError {
+    MshError::Format { problem }
+}
+
+fn version(name: &[u8]) -> Result<Version, MshError> {
+    match name {
+        b"2" | b"2.0" | b"2.1" | b"2.2" => Ok(Version::Two),
+        b"4.1" => Ok(Version::Four),
+        _ => Err(MshError::Version { version: shown(name) }),
+    }
+}
+
+/// The binary values after the format, and the order of their bytes, which the number 1 tells.
+fn binary<'a>(file: &'a [u8], words: Words<'a>) -> Result<(Binary<'a>, &'static str), MshError> {
+    let mut values = Binary { file, at: file.len() - words.rest().len(), big: false };
+    values.end_line();
+    match values.int() {
+        Ok(1) => Ok((values, "little-endian")),
+        Ok(0x0100_0000) => Ok((Binary { big: true, ..values }, "big-endian")),
+        _ => Err(format_error("the number 1 does not follow, which tells the order of bytes".to_owned())),
+    }
+}
+
+/// What was read so far.
+#[derive(Default)]
+struct Found<'n> {
+    nodes: Option<Nodes>,
+    surface: Option<Surface<'n>>,
+}
+
+/// Reads all sections, from the end of the format on.
+fn body<'a, V: Values<'a>>(
+    mut values: V,
+    version: Version,
+    limits: &Limits,
+    mut notes: Notes,
+) -> Result<Content, ReadError> {
+    let mut found = Found::default();
+    end_section(&mut values, b"MeshFormat")?;
+    // Whatever stands between sections is a comment.
+    while let Some(word) = values.word() {
+        if let Some(name) = word.strip_prefix(b"$") {
+            let section = shown(name);
+            found.section(name, &mut values, version, limits, &mut notes).map_err(|fault| match fault {
+                Fault::End => MshError::Truncated { section, place: values.place() },
+                Fault::Short => MshError::Short { section, place: values.place() },
+                Fault::Value(problem) => MshError::Value { section, problem, place: values.place() },
+                Fault::Told(error) => *error,
+            })?;
+        }
+    }
+    let none = |section| MshError::NoSection { section, late: false };
+    let surface = found.surface.ok_or_else(|| none(if found.nodes.is_some() { "Elements" } else { "Nodes" }))?;
+    Ok(Content { soup: surface.finish(&mut notes)?, notes })
+}
+
+impl<'n> Found<'n> {
+    /// Reads a section, whose name was read.
+    fn section<'a, V: Values<'a>>(
+        &mut self,
+        name: &[u8],
+        values: &mut V,
+        version: Version,
+        limits: &'n Limits,
+        notes: &mut Notes,
+    ) -> Result<(), Fault> {
+        match (name, version) {
+            (b"Nodes" | b"ParametricNodes", _) if self.nodes.is_some() || self.surface.is_some() => {
+                return Err(second(name, values));
+            }
+            (b"Nodes", Version::Four) => self.nodes = Some(sections::nodes_4(values, limits)?),
+            (b"Nodes", Version::Two) => self.nodes = Some(sections::nodes_2(values, false, limits)?),
+            (b"ParametricNodes", Version::Two) => self.nodes = Some(sections::nodes_2(values, true, limits)?),
+            (b"Elements", _) if self.surface.is_some() => return Err(second(name, values)),
+            (b"Elements", _) => {
+                let nodes = self.nodes.take().ok_or(MshError::NoSection { section: "Nodes", late: true })?;
+                let surface = self.surface.insert(Surface::new(nodes, limits));
+                match version {
+                    Version::Two => sections::elements_2(values, surface)?,
+                    Version::Four => sections::elements_4(values, surface)?,
+                }
+            }
+            (b"PhysicalNames", _) => {
+                names(values.until_end(name).ok_or(Fault::End)?, notes);
+                return Ok(());
+            }
+            _ => {
+                values.until_end(name).ok_or(Fault::End)?;
+                return Ok(());
+            }
+        }
+        Ok(end_section(values, name)?)
+    }
+}
+
+fn second<'a>(name: &[u8], values: &impl Values<'a>) -> Fault {
+    MshError::SecondSection { section: shown(name), place: values.place() }.into()
+}
+
+/// Passes over the end of a section.
+fn end_section<'a>(values: &mut impl Values<'a>, name: &[u8]) -> Result<(), MshError> {
+    let section = shown(name);
+    match values.word() {
+        Some(word) if word.strip_prefix(b"$End") == Some(name) => Ok(()),
+        Some(word) => Err(MshError::NoEnd { section, found: shown(word), place: values.place() }),
+        None => Err(MshError::Truncated { section, place: values.place() }),
+    }
+}
+
+/// The names of physical groups: in each line one, between quotes.
+fn names(section: &[u8], notes: &mut Notes) {
+    for line in section.split(|b| *b == b'\n') {
+        let quotes = |b: &u8| *b == b'"';
+        let (first, last) = (line.iter().position(quotes), line.iter().rposition(quotes));
+        if let Some((first, last)) = first.zip(last).filter(|(first, last)| first < last) {
+            notes.name(&String::from_utf8_lossy(&line[first + 1..last]));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,115 @@
+//! Nodes by their tags.
+
+use super::MshError;
+use pipeline::space::Vec3;
+
+/// A table by tag may have so many places per node.
+const PLACES: u64 = 4;
+
+/// The nodes of a file: where they are, and which is meant by a tag.
+#[derive(Debug)]
+pub struct Nodes {
+    pub points: Vec<Vec3>,
+    numbering: Numbering,
+}
+
+/// The positions of tags. Tags may be any numbers, and memory is taken for as many as there are only.
+#[derive(Debug, PartialEq, Eq)]
+enum Numbering {
+    /// One follows the other, from this one on.
+    Run(u64),
+    /// From this one on, with gaps.
+    Table(u64, Vec<u32>),
+    /// Tag and position, by tag.
+    Sorted(Vec<(u64, u32)>),
+}
+
+/// In tables: no node.
+const GAP: u32 = u32::MAX;
+
+impl Nodes {
+    /// Nodes, each with its tag.
+    pub fn new(points: Vec<Vec3>, tags: &[u64]) -> Result<Self, MshError> {
+        Ok(Self { points, numbering: Numbering::new(tags)? })
+    }
+
+    /// The position of the node with this tag.
+    #[inline]
+    pub fn find(&self, tag: u64) -> Option<u32> {
+        match &self.numbering {
+            Numbering::Run(first) => {
+                let at = tag.checked_sub(*first).filter(|at| *at < self.points.len() as u64);
+                at.map(|at| at as u32)
+            }
+            Numbering::Table(first, table) => {
+                let at = usize::try_from(tag.checked_sub(*first)?).ok()?;
+                table.get(at).copied().filter(|node| *node != GAP)
+            }
+            Numbering::Sorted(tags) => {
+                let at = tags.binary_search_by_key(&tag, |(tag, _)| *tag).ok()?;
+                Some(tags[at].1)
+            }
+        }
+    }
+}
+
+impl Numbering {
+    fn new(tags: &[u64]) -> Result<Self, MshError> {
+        let first = tags.iter().copied().min().unwrap_or(0);
+        let span = tags.iter().copied().max().unwrap_or(0) - first;
+        if tags.iter().zip(0..).all(|(tag, i)| tag - first == i) {
+            Ok(Self::Run(first))
+        } else if span < PLACES * tags.len() as u64 {
+            Self::table(tags, first, span as usize + 1)
+        } else {
+            Self::sorted(tags)
+        }
+    }
+
+    fn table(tags: &[u64], first: u64, places: usize) -> Result<Self, MshError> {
+        let mut table = vec![GAP; places];
+        for (node, tag) in tags.iter().enumerate() {
+            let place = &mut table[(tag - first) as usize];
+            if *place != GAP {
+                return Err(MshError::SameNode { node: *tag });
+            }
+            *place = node as u32;
+        }
+        Ok(Self::Table(first, table))
+    }
+
+    fn sorted(tags: &[u64]) -> Result<Self, MshError> {
+        let mut sorted: Vec<(u64, u32)> = tags.iter().copied().zip(0..).collect();
+        sorted.sort_unstable();
+        match sorted.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            Some(pair) => Err(MshError::SameNode { node: pair[0].0 }),
+            None => Ok(Self::Sorted(sorted)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tags_of_all_sorts_are_found() {
+        let rows: [&[u64]; 6] = [&[], &[7], &[5, 6, 7, 8], &[8, 6, 5, 7], &[10, 3, 5, 7], &[1, u64::MAX, 1 << 40, 0]];
+        for tags in rows {
+            let points = vec![[0.0; 3]; tags.len()];
+            let nodes = Nodes::new(points, tags).expect("distinct tags");
+            for tag in [0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 1 << 40, u64::MAX - 1, u64::MAX] {
+                let expected = tags.iter().position(|t| *t == tag).map(|at| at as u32);
+                assert_eq!(nodes.find(tag), expected, "{tag} among {tags:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn equal_tags_are_refused() {
+        for tags in [[1, 2, 2], [5, 5, 5], [1, u64::MAX, 1]] {
+            let twice = Nodes::new(vec![[0.0; 3]; 3], &tags).map(|nodes| nodes.points);
+            assert!(matches!(twice, Err(MshError::SameNode { .. })), "{tags:?}");
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! The sections of nodes and elements, of MSH 2 and MSH 4.1.
+
+use super::MshError;
+use super::nodes::Nodes;
+use super::shapes::{Kind, Shape};
+use super::surface::Surface;
+use super::values::{Fault, Values, number};
+use crate::formats::Limits;
+use pipeline::space::Vec3;
+
+/// Checks that so many records can be there, of so many bytes each at least.
+fn fits<'a, V: Values<'a>>(values: &V, what: &'static str, count: u64, bytes: u64, most: u64) -> Result<(), MshError> {
+    let (needed, left, place) = (count.saturating_mul(bytes), values.left(), values.place());
+    if needed > left {
+        return Err(MshError::Count { what, count, needed, left, place });
+    }
+    if count > most { Err(MshError::TooMany { what, count, limit: most }) } else { Ok(()) }
+}
+
+/// Nodes on their way.
+struct Growing {
+    points: Vec<Vec3>,
+    tags: Vec<u64>,
+}
+
+impl Growing {
+    /// Room for so many, which were checked.
+    fn new(count: u64) -> Self {
+        let count = usize::try_from(count).unwrap_or(0);
+        Self { points: Vec::with_capacity(count), tags: Vec::with_capacity(count) }
+    }
+
+    /// Reads the coordinates of a node.
+    fn point<'a, V: Values<'a>>(&mut self, values: &mut V, node: u64) -> Result<(), Fault> {
+        let begin = values.place();
+        let point = [values.double()?, values.double()?, values.double()?];
+        if let Some(value) = point.iter().find(|c| !c.is_finite()) {
+            return Err(MshError::NotFinite { node, value: value.to_string(), place: values.place_since(begin) }.into());
+        }
+        self.points.push(point);
+        Ok(())
+    }
+}
+
+/// How many numbers follow the coordinates of a node that lies on something of this dimension, where its parameters
+/// are told.
+fn parameters(dimension: i64) -> Result<u64, Fault> {
+    u64::try_from(dimension)
+        .ok()
+        .filter(|d| *d <= 3)
+        .ok_or_else(|| Fault::Value(format!("{dimension} is no dimension (0 to 3)")))
+}
+
+/// `$Nodes` of MSH 2, or `$ParametricNodes`.
+pub fn nodes_2<'a, V: Values<'a>>(values: &mut V, parametric: bool, limits: &Limits) -> Result<Nodes, Fault> {
+    let count: u64 = number(values.word())?;
+    values.end_line();
+    fits(values, "nodes", count, V::INT + 3 * V::DOUBLE, limits.elements)?;
+    let mut nodes = Growing::new(count);
+    for _ in 0..count {
+        let tag = values.natural()?;
+        nodes.tags.push(tag);
+        nodes.point(values, tag)?;
+        if parametric {
+            let dimension = values.int()?;
+            values.skip(1, V::INT)?;
+            // In volumes there are none.
+            let numbers = parameters(dimension)? % 3;
+            values.skip(numbers, V::DOUBLE)?;
+        }
+    }
+    Ok(Nodes::new(nodes.points, &nodes.tags)?)
+}
+
+/// `$Nodes` of MSH 4.1.
+pub fn nodes_4<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nodes, Fault> {
+    values.end_line();
+    let (blocks, count) = (values.size()?, values.size()?);
+    values.skip(2, V::SIZE)?;
+    fits(values, "nodes", count, V::SIZE + 3 * V::DOUBLE, limits.elements)?;
+    let mut nodes = Growing::new(count);
+    for _ in 0..blocks {
+        let (dimension, _, parametric) = (values.int()?, values.int()?, values.int()?);
+        let numbers = if parametric == 0 { 0 } else { parameters(dimension)? };
+        let block = values.size()?;
+        within(values, "nodes", block, count - nodes.tags.len() as u64, count)?;
+        let first = nodes.tags.len();
+        for _ in 0..block {
+            nodes.tags.push(values.size()?);
+        }
+        for i in first..nodes.tags.len() {
+            nodes.point(values, nodes.tags[i])?;
+            values.skip(numbers, V::DOUBLE)?;
+        }
+    }
+    all(values, "nodes", nodes.tags.len() as u64, count)?;
+    Ok(Nodes::new(nodes.points, &nodes.tags)?)
+}
+
+/// Checks that a block has no more records than are left of those declared for all.
+fn within<'a, V: Values<'a>>(
+    values: &V,
+    what: &'static str,
+    block: u64,
+    left: u64,
+    count: u64,
+) -> Result<(), MshError> {
+    if block <= left {
+        return Ok(());
+    }
+    Err(MshError::Sum { what, count, found: (count - left).saturating_add(block), place: values.place() })
+}
+
+/// Checks that all declared records were there.
+fn all<'a, V: Values<'a>>(values: &V, what: &'static str, found: u64, count: u64) -> Result<(), MshError> {
+    if found == count { Ok(()) } else { Err(MshError::Sum { what, count, found, place: values.place() }) }
+}
+
+fn shape<'a, V: Values<'a>>(values: &V, number: i64) -> Result<Shape, MshError> {
+    Shape::of(number).ok_or_else(|| MshError::NoType { number, place: values.place() })
+}
+
+/// `$Elements` of MSH 2.
+pub fn elements_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), Fault> {
+    let count: u64 = number(values.word())?;
+    values.end_line();
+    fits(values, "elements", count, 2 * V::INT, surface.limits.elements)?;
+    if V::BINARY { blocks_2(values, surface, count) } else { lines_2(values, surface, count) }
+}
+
+/// One element after the other: tag, type, number of further tags, these, nodes.
+fn lines_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64) -> Result<(), Fault> {
+    for _ in 0..count {
+        let (element, number, tags) = (values.natural()?, values.int()?, values.natural()?);
+        let shape = shape(values, number)?;
+        values.skip(tags, V::INT)?;
+        match shape.kind {
+            Kind::Other(kind) => {
+                surface.skip(kind, 1);
+                values.skip(shape.nodes as u64, V::INT)?;
+            }
+            _ => surface.element(values, shape, element, V::natural)?,
+        }
+    }
+    Ok(())
+}
+
+/// Elements of one type together: type, how many, number of further tags; then of each its tag, these, nodes.
+fn blocks_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64) -> Result<(), Fault> {
+    let mut left = count;
+    while left > 0 {
+        let (number, block, tags) = (values.int()?, values.natural()?, values.natural()?);
+        let shape = shape(values, number)?;
+        within(values, "elements", block, left, count)?;
+        left -= block;
+        if let Kind::Other(kind) = shape.kind {
+            surface.skip(kind, block);
+            skip_records(values, block, 1 + tags + shape.nodes as u64, V::INT)?;
+            continue;
+        }
+        for _ in 0..block {
+            let element = values.natural()?;
+            values.skip(tags, V::INT)?;
+            surface.element(values, shape, element, V::natural)?;
+        }
+    }
+    Ok(())
+}
+
+/// `$Elements` of MSH 4.1.
+pub fn elements_4<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), Fault> {
+    values.end_line();
+    let (blocks, count) = (values.size()?, values.size()?);
+    values.skip(2, V::SIZE)?;
+    fits(values, "elements", count, 2 * V::SIZE, surface.limits.elements)?;
+    let mut left = count;
+    for _ in 0..blocks {
+        values.skip(2, V::INT)?;
+        let (number, block) = (values.int()?, values.size()?);
+        let shape = shape(values, number)?;
+        within(values, "elements", block, left, count)?;
+        left -= block;
+        if let Kind::Other(kind) = shape.kind {
+            surface.skip(kind, block);
+            skip_records(values, block, 1 + shape.nodes as u64, V::SIZE)?;
+            continue;
+        }
+        for _ in 0..block {
+            let element = values.size()?;
+            surface.element(values, shape, element, V::size)?;
+        }
+    }
+    all(values, "elements", count - left, count)?;
+    Ok(())
+}
+
+/// Passes over records of so many numbers each.
+fn skip_records<'a, V: Values<'a>>(values: &mut V, count: u64, numbers: u64, bytes: u64) -> Result<(), Fault> {
+    values.skip(count.checked_mul(numbers).ok_or(Fault::End)?, bytes)
+}

@@ -1,0 +1,415 @@
+use super::*;
+use crate::formats::mutate::mutations;
+use crate::formats::{Limits, Nothing};
+use pipeline::mesh::SoupError;
+use pipeline::space::Vec3;
+use std::path::Path;
+
+fn content(bytes: &[u8]) -> Result<Content, ReadError> {
+    read(&Source { bytes, limits: &Limits::default(), beside: &Nothing })
+}
+
+/// How a file is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Encoding {
+    Ascii,
+    Little,
+    Big,
+}
+
+use Encoding::{Ascii, Big, Little};
+
+/// A mesh: nodes that lie on something of a dimension, with their tags, and elements of one type.
+#[derive(Clone)]
+struct Mesh {
+    parametric: Option<i64>,
+    nodes: Vec<(u64, Vec3)>,
+    blocks: Vec<(i64, Vec<Vec<u64>>)>,
+    /// Text of further sections before the nodes.
+    more: &'static str,
+}
+
+/// A file on its way.
+struct File {
+    bytes: Vec<u8>,
+    encoding: Encoding,
+}
+
+impl File {
+    fn text(&mut self, text: &str) {
+        self.bytes.extend(text.bytes());
+    }
+
+    fn value(&mut self, text: &str, mut bytes: Vec<u8>) {
+        match self.encoding {
+            Ascii => return self.text(&format!("{text} ")),
+            Little => {}
+            Big => bytes.reverse(),
+        }
+        self.bytes.extend(bytes);
+    }
+
+    fn int(&mut self, value: i64) {
+        self.value(&value.to_string(), (value as i32).to_le_bytes().to_vec());
+    }
+
+    fn size(&mut self, value: u64) {
+        self.value(&value.to_string(), value.to_le_bytes().to_vec());
+    }
+
+    fn double(&mut self, value: f64) {
+        self.value(&value.to_string(), value.to_le_bytes().to_vec());
+    }
+
+    fn line(&mut self) {
+        if self.encoding == Ascii {
+            self.text("\n");
+        }
+    }
+
+    fn point(&mut self, point: Vec3, parameters: i64) {
+        point.into_iter().for_each(|c| self.double(c));
+        (0..parameters).for_each(|p| self.double(p as f64));
+    }
+}
+
+impl Mesh {
+    fn file(&self, version: &str, encoding: Encoding) -> Vec<u8> {
+        let mut file = File { bytes: Vec::new(), encoding };
+        file.text(&format!("$MeshFormat\n{version} {} 8\n", i32::from(encoding != Ascii)));
+        if encoding != Ascii {
+            file.int(1);
+            file.text("\n");
+        }
+        file.text("$EndMeshFormat\n");
+        file.text(self.more);
+        if version.starts_with('4') {
+            self.sections_4(&mut file)
+        } else {
+            self.sections_2(&mut file)
+        }
+        file.bytes
+    }
+
+    fn elements(&self) -> usize {
+        self.blocks.iter().map(|b| b.1.len()).sum()
+    }
+
+    fn sections_2(&self, file: &mut File) {
+        let name = if self.parametric.is_some() { "ParametricNodes" } else { "Nodes" };
+        file.text(&format!("${name}\n{}\n", self.nodes.len()));
+        for (tag, point) in &self.nodes {
+            file.int(*tag as i64);
+            file.point(*point, 0);
+            if let Some(dimension) = self.parametric {
+                file.int(dimension);
+                file.int(77);
+                (0..dimension % 3).for_each(|p| file.double(p as f64));
+            }
+            file.line();
+        }
+        file.text(&format!("\n$End{name}\n$Elements\n{}\n", self.elements()));
+        let mut tag = 100;
+        for (number, elements) in &self.blocks {
+            if file.encoding != Ascii {
+                [*number, elements.len() as i64, 2].into_iter().for_each(|i| file.int(i));
+            }
+            for nodes in elements {
+                tag += 1;
+                file.int(tag);
+                if file.encoding == Ascii {
+                    [*number, 2].into_iter().for_each(|i| file.int(i));
+                }
+                [8, 9].into_iter().for_each(|i| file.int(i));
+                nodes.iter().for_each(|n| file.int(*n as i64));
+                file.line();
+            }
+        }
+        file.text("\n$EndElements");
+    }
+
+    /// Nodes in two blocks.
+    fn sections_4(&self, file: &mut File) {
+        file.text("$Nodes\n");
+        [2, self.nodes.len() as u64, 1, 9].into_iter().for_each(|i| file.size(i));
+        let (first, second) = self.nodes.split_at(self.nodes.len().min(1));
+        let dimension = self.parametric.unwrap_or(2);
+        for block in [first, second] {
+            file.line();
+            [dimension, 5, i64::from(self.parametric.is_some())].into_iter().for_each(|i| file.int(i));
+            file.size(block.len() as u64);
+            file.line();
+            block.iter().for_each(|n| file.size(n.0));
+            block.iter().for_each(|n| file.point(n.1, self.parametric.unwrap_or(0)));
+        }
+        file.text("\n$EndNodes\n$Elements\n");
+        [self.blocks.len() as u64, self.elements() as u64, 1, 9].into_iter().for_each(|i| file.size(i));
+        let mut tag = 100;
+        for (number, elements) in &self.blocks {
+            file.line();
+            [2, 5, *number].into_iter().for_each(|i| file.int(i));
+            file.size(elements.len() as u64);
+            for nodes in elements {
+                tag += 1;
+                file.line();
+                file.size(tag);
+                nodes.iter().for_each(|n| file.size(*n));
+            }
+        }
+        file.text("\n$EndElements");
+    }
+}
+
+const ALL: [(&str, Encoding); 9] = [
+    ("2", Ascii),
+    ("2.0", Big),
+    ("2.1", Ascii),
+    ("2.2", Ascii),
+    ("2.2", Little),
+    ("2.2", Big),
+    ("4.1", Ascii),
+    ("4.1", Little),
+    ("4.1", Big),
+];
+
+/// What a mesh gives in all versions and encodings, which must be the same.
+fn in_all_encodings(mesh: &Mesh) -> Content {
+    let contents = ALL.map(|(version, encoding)| {
+        content(&mesh.file(version, encoding)).unwrap_or_else(|e| panic!("{version} {encoding:?}: {e}"))
+    });
+    for (content, how) in contents.iter().zip(ALL) {
+        let notes = Notes { format: contents[0].notes.format.clone(), ..content.notes.clone() };
+        assert_eq!((&content.soup, &notes), (&contents[0].soup, &contents[0].notes), "{how:?}");
+    }
+    contents.into_iter().next().expect("nine")
+}
+
+/// Two triangles of a square.
+fn square() -> Mesh {
+    let nodes = vec![(1, [0.0; 3]), (2, [1.0, 0.0, 0.0]), (3, [1.0, 1.0, 0.0]), (4, [0.0, 1.0, 0.0])];
+    Mesh { parametric: None, nodes, blocks: vec![(2, vec![vec![1, 2, 3], vec![1, 3, 4]])], more: "" }
+}
+
+fn error(bytes: &[u8]) -> MshError {
+    match content(bytes) {
+        Err(ReadError::Msh(e)) => e,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn triangles_are_read_from_all_versions() {
+    let found = in_all_encodings(&square());
+    assert_eq!(found.soup.points(), [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+    assert_eq!(found.soup.triangles(), [[0, 1, 2], [0, 2, 3]]);
+    let formats = [("2.2", Ascii), ("4.1", Little), ("4.1", Big)]
+        .map(|(version, encoding)| content(&square().file(version, encoding)).expect("read").notes.format);
+    assert_eq!(formats, ["MSH 2.2, ASCII", "MSH 4.1, binary, little-endian", "MSH 4.1, binary, big-endian"]);
+}
+
+#[test]
+fn tags_may_be_any_numbers() {
+    for tags in [[1, 2, 3, 4], [4, 3, 2, 1], [10, 20, 30, 40], [7, 2_000_000_000, 1, 90]] {
+        let mut mesh = square();
+        mesh.nodes.iter_mut().zip(tags).for_each(|(node, tag)| node.0 = tag);
+        let new = |n: &u64| tags[*n as usize - 1];
+        mesh.blocks[0].1.iter_mut().for_each(|e| *e = e.iter().map(new).collect());
+        assert_eq!(in_all_encodings(&mesh).soup, in_all_encodings(&square()).soup, "{tags:?}");
+    }
+    let huge = String::from_utf8(square().file("4.1", Ascii)).expect("text").replace("4 ", "18446744073709551615 ");
+    let huge = huge.replace("2 5 2 2 ", "2 5 2 2 ").replacen("2 18446744073709551615 1 9", "2 4 1 9", 1);
+    assert_eq!(content(huge.as_bytes()).map(|c| c.soup), Ok(in_all_encodings(&square()).soup), "{huge}");
+}
+
+#[test]
+fn quads_and_elements_of_higher_order_are_taken_by_their_corners() {
+    let mut mesh = square();
+    let middle = |k: u64| [k as f64 / 10.0, 0.5, 0.25];
+    // The nodes in the middle come first, so that the corners are renumbered.
+    mesh.nodes = (11..=15).map(|k| (k, middle(k))).chain(mesh.nodes).chain([(99, [5.0; 3])]).collect();
+    mesh.blocks = vec![
+        (9, vec![vec![1, 2, 3, 11, 12, 13]]),
+        (16, vec![vec![1, 2, 3, 4, 11, 12, 13, 14]]),
+        (10, vec![vec![1, 2, 3, 4, 11, 12, 13, 14, 15]]),
+        (3, vec![vec![4, 1, 2, 3]]),
+    ];
+    let found = in_all_encodings(&mesh);
+    assert_eq!((found.notes.mid_nodes, found.notes.polygons, found.soup.points().len()), (5, 3, 5));
+    assert_eq!(found.soup.points()[..4], *in_all_encodings(&square()).soup.points());
+    assert_eq!(found.soup.triangles()[..3], [[0, 1, 2], [3, 0, 1], [3, 1, 2]]);
+    assert_eq!(found.soup.triangles().len(), 7);
+}
+
+#[test]
+fn other_elements_are_counted_by_kind() {
+    let mut mesh = square();
+    let two = mesh.blocks.remove(0);
+    mesh.blocks = vec![
+        (15, vec![vec![1], vec![2]]),
+        (1, vec![vec![1, 2]]),
+        (8, vec![vec![1, 2, 3]]),
+        two,
+        (4, vec![vec![1, 2, 3, 4]; 3]),
+        (5, vec![vec![7; 8]]),
+        (6, vec![vec![1; 6]]),
+        (7, vec![vec![1; 5]]),
+    ];
+    let found = in_all_encodings(&mesh);
+    let skipped: Vec<(&str, usize)> = found.notes.skipped.iter().map(|(k, n)| (k.as_str(), *n)).collect();
+    let expected = [("hexahedron", 1), ("line", 2), ("point", 2), ("prism", 1), ("pyramid", 1), ("tetrahedron", 3)];
+    assert_eq!((skipped, found.soup.triangles().len()), (expected.to_vec(), 2));
+}
+
+#[test]
+fn parameters_of_nodes_are_passed_over() {
+    for dimension in 0..=3 {
+        let mesh = Mesh { parametric: Some(dimension), ..square() };
+        assert_eq!(in_all_encodings(&mesh).soup, in_all_encodings(&square()).soup, "{dimension}");
+    }
+}
+
+#[test]
+fn names_are_kept_and_other_sections_passed_over() {
+    let more = "$PhysicalNames\n2\n2 7 \"the side wall\"\n2 8 \"$EndNodes \"lid\"\"\n$EndPhysicalNames\n\
+                a comment\n$Entities\n$Nodes $EndEntitiesx \x01\x02 $Elements\n$EndEntities\n$Comments\n\n$EndComments\n";
+    let found = in_all_encodings(&Mesh { more, ..square() });
+    assert_eq!(found.notes.names, ["the side wall", "$EndNodes \"lid\""]);
+    let mut after = square().file("4.1", Little);
+    after.extend(b"\n$NodeData\n\xff\xfe$End\x00\x01\n$EndNodeData\n");
+    assert!(content(&after).is_ok());
+    let windows = String::from_utf8(Mesh { more, ..square() }.file("2.2", Ascii)).expect("text").replace('\n', "\r\n");
+    assert_eq!(content(windows.as_bytes()), content(&Mesh { more, ..square() }.file("2.2", Ascii)));
+}
+
+#[test]
+fn broken_files_are_refused_with_code_and_place() {
+    let two = String::from_utf8(square().file("2.2", Ascii)).expect("text");
+    let four = String::from_utf8(square().file("4.1", Ascii)).expect("text");
+    let nodes = "$Nodes\n4\n";
+    let rows = [
+        (two.replace("$Mesh", "Mesh"), Code::Malformed, Some("line 1"), "no MSH"),
+        (two.replace("2.2", "1"), Code::UnsupportedFormat, Some("line 2"), "-format msh41"),
+        (two.replace("2.2", "4.0"), Code::UnsupportedFormat, Some("line 2"), "4.0"),
+        ("$NOD\n1\n1 0 0 0\n".to_owned(), Code::UnsupportedFormat, Some("line 2"), "version 1"),
+        (two.replace("0 8", "2 8"), Code::Malformed, Some("line 2"), "neither 0"),
+        (two.replace("0 8", "0 4"), Code::Malformed, Some("line 2"), "4 bytes"),
+        (two.replace("0 8", "1 8"), Code::Malformed, Some("line 2"), "order of bytes"),
+        (two.replace(nodes, "$Nodes\n5\n"), Code::CountMismatch, Some("line 11"), "section $Nodes ends"),
+        (two.replace(nodes, "$Nodes\n3\n"), Code::CountMismatch, Some("line 9"), "goes on with \"4\""),
+        (two.replace(nodes, "$Nodes\n4000000000\n"), Code::CountMismatch, Some("line 5"), "4000000000 nodes"),
+        (two.replace(nodes, "$Nodes\n18446744073709551615\n"), Code::CountMismatch, Some("line 5"), "cut off"),
+        (two.replace(nodes, "$Nodes\n-4\n"), Code::Malformed, Some("line 5"), "\"-4\""),
+        (two.replace("2 1 0 0", "1 1 0 0"), Code::Malformed, Some("node 1"), "two nodes 1"),
+        (two.replace("2 1 0 0", "-2 1 0 0"), Code::Malformed, Some("line 7"), "-2 is negative"),
+        (two.replace("2 1 0 0", "2 1 nan 0"), Code::NotFinite, Some("line 7"), "NaN"),
+        (two.replace("2 1 0 0", "2 1 x 0"), Code::Malformed, Some("line 7"), "\"x\" is no number"),
+        (two.replace("8 9 1 3 4", "8 9 1 3 5"), Code::Malformed, Some("line 15"), "element 102 names node 5"),
+        (two.replace("102 2 2", "102 34 2"), Code::Malformed, Some("line 15"), "34 is no type"),
+        (two.replace("102 2 2", "102 2 -2"), Code::Malformed, Some("line 15"), "-2 is negative"),
+        (two.replace("$Elements\n2", "$Elements\n1"), Code::CountMismatch, Some("line 15"), "\"102\""),
+        (two.replace("Nodes", "Knots"), Code::Malformed, None, "no section $Nodes before"),
+        (two.replace("Elements", "Things"), Code::Malformed, None, "no section $Elements"),
+        (two.clone() + "\n$Nodes\n0\n$EndNodes", Code::Malformed, Some("line 18"), "another section $Nodes"),
+        (two.clone() + "\n$Elements\n0\n$EndElements", Code::Malformed, Some("line 18"), "another section $Elements"),
+        (two.clone() + "\n$Periodic\n", Code::CountMismatch, Some("line 18"), "$Periodic"),
+        (four.replace("2 4 1 9", "2 9 1 9"), Code::CountMismatch, Some("line 9"), "9 nodes"),
+        (four.replace("2 4 1 9", "2 3 1 9"), Code::CountMismatch, Some("line 8"), "blocks hold 4"),
+        (four.replace("2 4 1 9", "1 4 1 9"), Code::CountMismatch, Some("line 7"), "blocks hold 1"),
+        (four.replace("1 2 1 9", "1 3 1 9"), Code::CountMismatch, Some("line 15"), "blocks hold 2"),
+        (four.replace("1 2 1 9", "1 1 1 9"), Code::CountMismatch, Some("line 13"), "blocks hold 2"),
+        (four.replace("2 5 0 3", "9 5 1 3"), Code::Malformed, Some("line 8"), "9 is no dimension"),
+    ];
+    for (text, code, place, word) in rows {
+        let reason = content(text.as_bytes()).expect_err(&text).reason();
+        assert_eq!((reason.code, reason.place.as_deref()), (code, place), "{reason:?}\n{text}");
+        assert!(reason.message.contains(word), "{reason:?}");
+    }
+    let cloud = Mesh { blocks: Vec::new(), ..square() };
+    let found = content(&cloud.file("4.1", Little));
+    assert!(matches!(found, Err(ReadError::Soup(SoupError::NoTriangles { points: 4 }))), "{found:?}");
+}
+
+#[test]
+fn broken_binary_files_are_refused_with_their_byte() {
+    let file = square().file("4.1", Big);
+    let at = |needle: &[u8]| file.windows(needle.len()).position(|w| w == needle).expect("found");
+    let with = |place: usize, new: &[u8]| {
+        let mut bytes = file.clone();
+        bytes[place..place + new.len()].copy_from_slice(new);
+        error(&bytes)
+    };
+    let nodes = at(b"$Nodes\n") + 7;
+    let many = with(nodes + 8, &u64::MAX.to_be_bytes());
+    assert!(matches!(many, MshError::Count { what: "nodes", count: u64::MAX, needed: u64::MAX, .. }), "{many:?}");
+    let point = nodes + 32 + 20 + 8;
+    let nan = with(point, &f64::NAN.to_be_bytes());
+    assert_eq!(nan, MshError::NotFinite { node: 1, value: "NaN".into(), place: Place::Byte(point) });
+    let elements = at(b"$Elements\n") + 10;
+    let block = with(elements + 32 + 12, &(1u64 << 63).to_be_bytes());
+    assert!(matches!(block, MshError::Sum { what: "elements", count: 2, .. }), "{block:?}");
+    let node = with(elements + 32 + 20 + 8, &7u64.to_be_bytes());
+    let place = Place::Byte(elements + 32 + 20 + 8);
+    assert_eq!(node, MshError::NoNode { element: 101, node: 7, place });
+}
+
+#[test]
+fn a_file_cut_off_anywhere_is_refused() {
+    for (version, encoding) in ALL {
+        let more = "$PhysicalNames\n1\n2 7 \"a\"\n$EndPhysicalNames\n$Entities\n0 0 0 0\n$EndEntities\n";
+        let file = Mesh { more, ..square() }.file(version, encoding);
+        assert!(content(&file).is_ok());
+        for end in 0..file.len() {
+            let error = content(&file[..end]).expect_err("cut off");
+            assert!(matches!(error, ReadError::Msh(_)), "{version} {encoding:?} {end}: {error:?}");
+        }
+    }
+}
+
+#[test]
+fn limits_are_kept() {
+    let limits = Limits { elements: 4, ..Limits::default() };
+    let with = |mesh: &Mesh| read(&Source { bytes: &mesh.file("2.2", Ascii), limits: &limits, beside: &Nothing });
+    let of = |number, elements: usize| Mesh { blocks: vec![(number, vec![vec![1, 2, 3, 4]; elements])], ..square() };
+    assert!(with(&of(3, 2)).is_ok());
+    for mesh in [of(3, 3), of(4, 5)] {
+        assert_eq!(with(&mesh).expect_err("too many").reason().code, Code::TooLarge);
+    }
+}
+
+#[test]
+fn mutated_files_do_no_harm() {
+    let mut mesh = square();
+    mesh.more = "$PhysicalNames\n1\n2 7 \"a\"\n$EndPhysicalNames\n";
+    mesh.nodes.extend((11..=13).map(|k| (k, [0.5; 3])));
+    mesh.blocks.extend([(15, vec![vec![1]]), (9, vec![vec![1, 2, 3, 11, 12, 13]]), (3, vec![vec![1, 2, 3, 4]])]);
+    let mut accepted = 0;
+    for parametric in [None, Some(2)] {
+        for (version, encoding) in ALL {
+            let file = Mesh { parametric, ..mesh.clone() }.file(version, encoding);
+            accepted += mutations(&file, 5_000).filter(|bytes| content(bytes).is_ok()).count();
+        }
+    }
+    assert!(accepted > 5_000, "{accepted}");
+}
+
+/// The real files, where they are at hand, have the counts of their manifest.
+#[test]
+fn real_files_are_read() {
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
+    let Ok(manifest) = std::fs::read_to_string(shared.join("meshes/MANIFEST.tsv")) else {
+        return eprintln!("skipped: {} is not at hand", shared.display());
+    };
+    let mut lines = manifest.lines().map(|line| line.split('\t').collect::<Vec<_>>());
+    let names = lines.next().expect("a header");
+    let column = |row: &[&str], name: &str| row[names.iter().position(|n| *n == name).expect("a column")].parse().ok();
+    for row in lines.filter(|row| row[0].ends_with(".msh")) {
+        let bytes = std::fs::read(shared.join("meshes").join(row[0])).expect("a file");
+        let Content { soup, notes } = content(&bytes).unwrap_or_else(|e| panic!("{}: {e}", row[0]));
+        let counts = (Some(soup.points().len() + notes.mid_nodes), Some(soup.triangles().len()));
+        assert_eq!(counts, (column(&row, "vertices_file"), column(&row, "triangles_file")), "{}", row[0]);
+        assert_eq!(Some(soup.points().len()), column(&row, "vertices_welded"), "{}", row[0]);
+    }
+    let broken = |name: &str| std::fs::read(shared.join("malformed").join(name)).expect("a file");
+    assert_eq!(error(&broken("msh_truncated_derived.msh")).code(), Code::CountMismatch);
+    assert!(matches!(content(&broken("msh_empty.msh")), Err(ReadError::Soup(SoupError::NoTriangles { points: 0 }))));
+}

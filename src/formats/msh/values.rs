@@ -1,0 +1,232 @@
+//! The values of an MSH file, as text or binary. The names of sections are text in both.
+
+use super::MshError;
+use crate::formats::place::{Place, shown};
+use crate::formats::words::{Words, float};
+
+/// What is wrong in a section.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The file ends.
+    End,
+    /// The section ends.
+    Short,
+    /// A value is not what it should be.
+    Value(String),
+    /// All is known.
+    Told(Box<MshError>),
+}
+
+impl From<MshError> for Fault {
+    fn from(error: MshError) -> Self {
+        Self::Told(Box::new(error))
+    }
+}
+
+/// Values, one after the other.
+pub trait Values<'a>: Clone {
+    /// Bytes that values take at least: of the types int, size_t and double.
+    const INT: u64;
+    const SIZE: u64;
+    const DOUBLE: u64;
+
+    /// Whether they are binary.
+    const BINARY: bool;
+
+    /// Where the next value is, or the last one.
+    fn place(&self) -> Place;
+
+    /// The place of a record that was read from here on: its line, or its first byte.
+    fn place_since(&self, begin: Place) -> Place {
+        if Self::BINARY { begin } else { self.place() }
+    }
+
+    /// Bytes that are left.
+    fn left(&self) -> u64;
+
+    /// The next word of text.
+    fn word(&mut self) -> Option<&'a [u8]>;
+
+    /// Ends a line of text, after which binary values begin.
+    fn end_line(&mut self);
+
+    /// The bytes up to the end of a section, which is passed over.
+    fn until_end(&mut self, section: &[u8]) -> Option<&'a [u8]>;
+
+    fn int(&mut self) -> Result<i64, Fault>;
+
+    fn size(&mut self) -> Result<u64, Fault>;
+
+    fn double(&mut self) -> Result<f64, Fault>;
+
+    /// Passes over so many values of so many bytes.
+    fn skip(&mut self, count: u64, bytes: u64) -> Result<(), Fault>;
+
+    /// An int that is not negative.
+    fn natural(&mut self) -> Result<u64, Fault> {
+        let int = self.int()?;
+        u64::try_from(int).map_err(|_| Fault::Value(format!("{int} is negative")))
+    }
+}
+
+/// The number that a word of text is.
+pub fn number<T: std::str::FromStr>(word: Option<&[u8]>) -> Result<T, Fault> {
+    let word = word.ok_or(Fault::End)?;
+    let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
+    number.ok_or_else(|| no_number(word))
+}
+
+fn no_number(word: &[u8]) -> Fault {
+    if word.starts_with(b"$") {
+        return Fault::Short;
+    }
+    Fault::Value(format!("\"{}\" is no number that can stand here", shown(word)))
+}
+
+/// Where the line that ends a section begins, and where its name ends.
+fn end_of(rest: &[u8], section: &[u8]) -> Option<(usize, usize)> {
+    let name = [b"$End", section].concat();
+    let blank = |at: usize| rest.get(at).is_none_or(u8::is_ascii_whitespace);
+    let stands = |at: &usize| rest[*at..].starts_with(&name) && (*at == 0 || blank(at - 1)) && blank(at + name.len());
+    let at = (0..rest.len()).filter(|at| rest[*at] == b'$').find(stands)?;
+    Some((at, at + name.len()))
+}
+
+/// Values as text. Their lines do not matter.
+#[derive(Clone)]
+pub struct Text<'a>(pub Words<'a>);
+
+impl<'a> Values<'a> for Text<'a> {
+    // A digit and a blank.
+    const INT: u64 = 2;
+    const SIZE: u64 = 2;
+    const DOUBLE: u64 = 2;
+    const BINARY: bool = false;
+
+    fn place(&self) -> Place {
+        Place::Line(self.0.line())
+    }
+
+    fn left(&self) -> u64 {
+        self.0.rest().len() as u64
+    }
+
+    #[inline]
+    fn word(&mut self) -> Option<&'a [u8]> {
+        self.0.next()
+    }
+
+    fn end_line(&mut self) {}
+
+    fn until_end(&mut self, section: &[u8]) -> Option<&'a [u8]> {
+        let rest = self.0.rest();
+        let (at, end) = end_of(rest, section)?;
+        self.0.advance(end);
+        Some(&rest[..at])
+    }
+
+    #[inline]
+    fn int(&mut self) -> Result<i64, Fault> {
+        number(self.word())
+    }
+
+    #[inline]
+    fn size(&mut self) -> Result<u64, Fault> {
+        number(self.word())
+    }
+
+    #[inline]
+    fn double(&mut self) -> Result<f64, Fault> {
+        let word = self.word().ok_or(Fault::End)?;
+        float(word).ok_or_else(|| no_number(word))
+    }
+
+    fn skip(&mut self, count: u64, _bytes: u64) -> Result<(), Fault> {
+        (0..count).try_for_each(|_| match self.word() {
+            Some(word) if word.starts_with(b"$") => Err(Fault::Short),
+            word => word.map(|_| ()).ok_or(Fault::End),
+        })
+    }
+}
+
+/// Binary values.
+#[derive(Clone)]
+pub struct Binary<'a> {
+    pub file: &'a [u8],
+    /// Where the next value is.
+    pub at: usize,
+    pub big: bool,
+}
+
+impl<'a> Binary<'a> {
+    fn rest(&self) -> &'a [u8] {
+        &self.file[self.at..]
+    }
+
+    #[inline]
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
+        let mut array: [u8; N] = *self.rest().first_chunk().ok_or(Fault::End)?;
+        self.at += N;
+        if self.big {
+            array.reverse();
+        }
+        Ok(array)
+    }
+}
+
+impl<'a> Values<'a> for Binary<'a> {
+    const INT: u64 = 4;
+    const SIZE: u64 = 8;
+    const DOUBLE: u64 = 8;
+    const BINARY: bool = true;
+
+    fn place(&self) -> Place {
+        Place::Byte(self.at)
+    }
+
+    fn left(&self) -> u64 {
+        self.rest().len() as u64
+    }
+
+    fn word(&mut self) -> Option<&'a [u8]> {
+        let mut words = Words::new(self.rest(), 1);
+        let word = words.next();
+        self.at = self.file.len() - words.rest().len();
+        word
+    }
+
+    fn end_line(&mut self) {
+        let rest = self.rest();
+        let end = [&b"\r\n"[..], b"\n"].into_iter().find(|end| rest.starts_with(end));
+        self.at += end.map_or(0, <[u8]>::len);
+    }
+
+    fn until_end(&mut self, section: &[u8]) -> Option<&'a [u8]> {
+        let rest = self.rest();
+        let (at, end) = end_of(rest, section)?;
+        self.at += end;
+        Some(&rest[..at])
+    }
+
+    #[inline]
+    fn int(&mut self) -> Result<i64, Fault> {
+        self.array().map(|b| i64::from(i32::from_le_bytes(b)))
+    }
+
+    #[inline]
+    fn size(&mut self) -> Result<u64, Fault> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    #[inline]
+    fn double(&mut self) -> Result<f64, Fault> {
+        self.array().map(f64::from_le_bytes)
+    }
+
+    fn skip(&mut self, count: u64, bytes: u64) -> Result<(), Fault> {
+        let size = count.checked_mul(bytes).filter(|size| *size <= self.left()).ok_or(Fault::End)?;
+        // It is no more than what is left of the file.
+        self.at += size as usize;
+        Ok(())
+    }
+}
