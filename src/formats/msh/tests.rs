@@ -217,7 +217,7 @@ fn tags_may_be_any_numbers() {
         assert_eq!(in_all_encodings(&mesh).soup, in_all_encodings(&square()).soup, "{tags:?}");
     }
     let huge = String::from_utf8(square().file("4.1", Ascii)).expect("text").replace("4 ", "18446744073709551615 ");
-    let huge = huge.replace("2 5 2 2 ", "2 5 2 2 ").replacen("2 18446744073709551615 1 9", "2 4 1 9", 1);
+    let huge = huge.replacen("2 18446744073709551615 1 9", "2 4 1 9", 1);
     assert_eq!(content(huge.as_bytes()).map(|c| c.soup), Ok(in_all_encodings(&square()).soup), "{huge}");
 }
 
