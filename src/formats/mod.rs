@@ -182,6 +182,11 @@ mod tests {
         assert_eq!(kind(Path::new("scan.ply")), Kind::Mesh(Format::Ply));
         assert_eq!(kind(Path::new("Part.Msh")), Kind::Mesh(Format::Msh));
         assert_eq!(kind(Path::new("scan.off")), Kind::OtherMesh("off".to_owned()));
+        for (name, format) in
+            [("a.vtk", Format::Vtk), ("a.vtu", Format::Vtu), ("a.VTP", Format::Vtp), ("a.pvtu", Format::Vtu)]
+        {
+            assert_eq!(kind(Path::new(name)), Kind::Mesh(format));
+        }
         for beside in ["scan.mtl", ".scan.stl", "scan.stl.part", "scan.obj~", "a.png"] {
             assert_eq!(kind(Path::new(beside)), Kind::NoMesh, "{beside}");
         }

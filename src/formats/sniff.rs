@@ -13,6 +13,7 @@ pub(super) fn sniff(bytes: &[u8]) -> Option<Format> {
     match text {
         _ if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") => Some(Format::Ply),
         _ if text.starts_with(b"# vtk DataFile") => Some(Format::Vtk),
+        _ if text.starts_with(b"$MeshFormat") => Some(Format::Msh),
         _ if text.starts_with(b"glTF") => Some(Format::Gltf),
         _ if text.starts_with(b"{") && has("\"asset\"") => Some(Format::Gltf),
         _ if text.starts_with(b"<") && has("<VTKFile") && has("UnstructuredGrid") => Some(Format::Vtu),
@@ -35,9 +36,10 @@ mod tests {
 
     #[test]
     fn only_what_is_beyond_doubt_is_recognised() {
-        let cases: [(&[u8], Option<Format>); 14] = [
+        let cases: [(&[u8], Option<Format>); 15] = [
             (b"ply\nformat ascii 1.0\n", Some(Format::Ply)),
             (b"# vtk DataFile Version 3.0\n", Some(Format::Vtk)),
+            (b"$MeshFormat\n4.1 0 8\n", Some(Format::Msh)),
             (b"glTF\x02\0\0\0", Some(Format::Gltf)),
             (b" {\"asset\": {\"version\": \"2.0\"}}", Some(Format::Gltf)),
             (b"<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">", Some(Format::Vtp)),

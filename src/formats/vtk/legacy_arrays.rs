@@ -223,7 +223,9 @@ impl<'a> Arrays<'a> {
                 (0..count).try_for_each(|_| self.text.word().map(|_| ()).ok_or_else(|| self.ends("the end of FIELD")))
             }
             Kind::String | Kind::Variant => {
-                self.text.blanks();
+                if !self.binary {
+                    self.text.line();
+                }
                 (0..count).try_for_each(|_| self.text.line().map(|_| ()).ok_or_else(|| self.ends("the end of FIELD")))
             }
         }
