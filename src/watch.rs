@@ -233,7 +233,7 @@ impl Eyes {
         } else {
             if !kind.is_dir() && self.passed_over.insert(name.to_owned()) {
                 tracing::warn!(
-                    input = shown(name.as_ref()),
+                    input = shown(name),
                     "passed over: no regular file of the inbox; copy the file itself"
                 );
             }
