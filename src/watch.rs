@@ -232,10 +232,7 @@ impl Eyes {
             Look::at(entry.path()).ok()??
         } else {
             if !kind.is_dir() && self.passed_over.insert(name.to_owned()) {
-                tracing::warn!(
-                    input = shown(name),
-                    "passed over: no regular file of the inbox; copy the file itself"
-                );
+                tracing::warn!(input = shown(name), "passed over: no regular file of the inbox; copy the file itself");
             }
             return None;
         };

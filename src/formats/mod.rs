@@ -63,9 +63,25 @@ const OTHER_MESHES: [&str; 1] = ["off"];
 /// The extensions that planish reads, as people are told.
 pub const READ: &str = ".stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh";
 
-/// Extensions of what lies beside meshes.
-const NO_MESHES: [&str; 13] =
-    ["mtl", "bin", "png", "jpg", "jpeg", "bmp", "tga", "txt", "md", "json", "tmp", "part", "crdownload"];
+/// Extensions of what lies beside meshes, or only names them.
+const NO_MESHES: [&str; 16] = [
+    "mtl",
+    "bin",
+    "png",
+    "jpg",
+    "jpeg",
+    "bmp",
+    "tga",
+    "txt",
+    "md",
+    "json",
+    "tmp",
+    "part",
+    "crdownload",
+    "vtm",
+    "pvtu",
+    "pvtp",
+];
 
 /// Tells the kind of a file by its name.
 pub fn kind(path: &Path) -> Kind {
@@ -77,9 +93,8 @@ pub fn kind(path: &Path) -> Kind {
         "obj" => Kind::Mesh(Format::Obj),
         "gltf" | "glb" => Kind::Mesh(Format::Gltf),
         "vtk" => Kind::Mesh(Format::Vtk),
-        // Files that name others are told apart by what they hold, and refused with the names of the right ones.
-        "vtu" | "pvtu" => Kind::Mesh(Format::Vtu),
-        "vtp" | "pvtp" | "vtm" => Kind::Mesh(Format::Vtp),
+        "vtu" => Kind::Mesh(Format::Vtu),
+        "vtp" => Kind::Mesh(Format::Vtp),
         "ply" => Kind::Mesh(Format::Ply),
         "msh" => Kind::Mesh(Format::Msh),
         e if OTHER_MESHES.contains(&e) => Kind::OtherMesh(extension),
@@ -182,9 +197,7 @@ mod tests {
         assert_eq!(kind(Path::new("scan.ply")), Kind::Mesh(Format::Ply));
         assert_eq!(kind(Path::new("Part.Msh")), Kind::Mesh(Format::Msh));
         assert_eq!(kind(Path::new("scan.off")), Kind::OtherMesh("off".to_owned()));
-        for (name, format) in
-            [("a.vtk", Format::Vtk), ("a.vtu", Format::Vtu), ("a.VTP", Format::Vtp), ("a.pvtu", Format::Vtu)]
-        {
+        for (name, format) in [("a.vtk", Format::Vtk), ("a.vtu", Format::Vtu), ("a.VTP", Format::Vtp)] {
             assert_eq!(kind(Path::new(name)), Kind::Mesh(format));
         }
         for beside in ["scan.mtl", ".scan.stl", "scan.stl.part", "scan.obj~", "a.png"] {
