@@ -5,6 +5,7 @@ mod corpus;
 mod daemon;
 mod every_mesh;
 mod fixtures;
+mod fuzz;
 mod interop;
 mod invariants;
 mod legality;

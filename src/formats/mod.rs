@@ -5,6 +5,7 @@ mod gltf;
 pub mod gmsh;
 mod msh;
 #[cfg(test)]
+#[path = "../../tests/fuzz/mutate.rs"]
 mod mutate;
 mod obj;
 mod place;

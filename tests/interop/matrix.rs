@@ -57,6 +57,19 @@ impl Matrix {
     }
 }
 
+/// The surface in all formats and encodings: names and contents.
+pub fn files() -> Vec<(String, Vec<u8>)> {
+    let folder = tempfile::tempdir().expect("a folder");
+    run(script("write_matrix.py").arg(folder.path()), "the surface could not be written");
+    let mut files: Vec<(String, Vec<u8>)> = std::fs::read_dir(folder.path())
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").path())
+        .map(|path| (path.display().to_string(), std::fs::read(&path).expect("written")))
+        .collect();
+    files.sort();
+    files
+}
+
 #[test]
 fn what_vtk_meshio_and_gmsh_write_is_read_back_equal() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -4,7 +4,7 @@
 //! The Python environment is made beside the sources (`.venv`, not under version control) when a test first needs
 //! it, with the packages of requirements.txt.
 
-mod matrix;
+pub mod matrix;
 pub mod recipe;
 pub mod remesh;
 

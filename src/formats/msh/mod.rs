@@ -70,7 +70,9 @@ pub enum MshError {
         place: Place,
     },
     /// There are more than may be.
-    #[error("{count} {what} exceed the limit of {limit}; split the file, or raise the limit")]
+    #[error(
+        "{count} {what} exceed the limit of {limit}; split the file, or raise `elements` in the table [limits] of planish.toml"
+    )]
     TooMany {
         /// Nodes, elements or triangles.
         what: &'static str,

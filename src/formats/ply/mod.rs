@@ -77,7 +77,9 @@ pub enum PlyError {
         line: usize,
     },
     /// There are more than may be.
-    #[error("{count} {what} exceed the limit of {limit}; split the file, or raise the limit")]
+    #[error(
+        "{count} {what} exceed the limit of {limit}; split the file, or raise `elements` in the table [limits] of planish.toml"
+    )]
     TooMany {
         /// What there is too much of.
         what: String,

@@ -23,7 +23,7 @@ const NUMBERS: [u64; 9] =
     [0, 1, 0x7f, 0x80, 0x7fff_ffff, 0x8000_0000, u64::MAX, 0x7ff0_0000_0000_0000, 0x7fc0_0000_7f80_0000];
 
 /// Mutations of `seed`, `rounds` of them.
-pub(super) fn mutations(seed: &[u8], rounds: u64) -> impl Iterator<Item = Vec<u8>> {
+pub fn mutations(seed: &[u8], rounds: u64) -> impl Iterator<Item = Vec<u8>> {
     (0..rounds).map(|round| {
         let mut random = Random(round.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x2545_f491_4f6c_dd1d);
         let mut bytes = seed.to_vec();
