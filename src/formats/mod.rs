@@ -14,15 +14,13 @@ mod polygon;
 mod sniff;
 mod stl;
 mod vtk;
-pub mod vtm;
-pub mod vtp;
-pub mod vtu;
 mod words;
 
 use crate::outcome::{Code, Reason};
 pub use content::{Beside, Content, Limits, Notes, Nothing, Source};
 use pipeline::mesh::SoupError;
 use std::path::Path;
+pub use vtk::{vtm, vtp, vtu};
 
 /// A format that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

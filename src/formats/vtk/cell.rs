@@ -43,6 +43,7 @@ pub(super) fn kind(cell_type: u8) -> (Kind, usize, usize) {
 pub(super) const TRIANGLE: u8 = 5;
 pub(super) const STRIP: u8 = 6;
 pub(super) const POLYGON: u8 = 7;
+pub(super) const QUADRATIC_TRIANGLE: u8 = 22;
 
 /// VTK's name of a type.
 pub(super) fn name(cell_type: u8) -> &'static str {

@@ -2,16 +2,20 @@
 //!
 //! What a file is its first bytes tell, not its name. Everything that makes a surface is read, as triangles;
 //! vertices, lines and volumes are counted. Quadratic triangles and quadrilaterals give their corners: edges are
-//! taken to be straight.
+//! taken to be straight. [`vtu`], [`vtp`] and [`vtm`] are what planish writes for ParaView.
 
 mod cell;
 mod error;
 mod legacy;
 mod legacy_arrays;
 mod packed;
+mod read_back;
 mod scalar;
 mod surface;
 mod text;
+pub mod vtm;
+pub mod vtp;
+pub mod vtu;
 mod xml;
 mod xml_outline;
 #[cfg(test)]

@@ -12,10 +12,9 @@ use std::borrow::Cow;
 
 /// Reads an XML file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
-    let file = outline(source.bytes, source.limits.depth)?;
+    let file = outline(source.bytes, source.limits.depth, &[])?;
     let mut surface = Surface::new(source.limits, format(&file));
-    let budget = Budget::new(source.bytes.len(), source.limits.unpacked(source.bytes.len()));
-    let mut arrays = Arrays { bytes: source.bytes, packing: file.packing, appended: file.appended, budget };
+    let mut arrays = Arrays::new(source, &file);
     for piece in &file.pieces {
         arrays.piece(piece, &mut surface)?;
     }
@@ -43,7 +42,7 @@ fn format(file: &Outline) -> String {
 }
 
 /// Decodes the arrays of a file.
-struct Arrays<'a> {
+pub(super) struct Arrays<'a> {
     bytes: &'a [u8],
     packing: Packing,
     appended: Option<Appended<'a>>,
@@ -51,6 +50,12 @@ struct Arrays<'a> {
 }
 
 impl<'a> Arrays<'a> {
+    /// The arrays of a file of this outline.
+    pub fn new(source: &Source<'a>, file: &Outline<'a>) -> Self {
+        let budget = Budget::new(source.bytes.len(), source.limits.unpacked(source.bytes.len()));
+        Self { bytes: source.bytes, packing: file.packing, appended: file.appended, budget }
+    }
+
     /// Adds the surface of a piece.
     fn piece(&mut self, piece: &Piece<'a>, surface: &mut Surface) -> Result<(), VtkError> {
         let bytes = self.bytes;
@@ -151,7 +156,7 @@ impl<'a> Arrays<'a> {
     }
 
     /// The bytes of an array that is no text.
-    fn bytes_of(&mut self, array: &Array<'a>, name: &str) -> Result<Cow<'a, [u8]>, VtkError> {
+    pub fn bytes_of(&mut self, array: &Array<'a>, name: &str) -> Result<Cow<'a, [u8]>, VtkError> {
         let stream = match (array.data, self.appended) {
             (Data::Appended(offset), Some(appended)) => {
                 let data = usize::try_from(offset).ok().and_then(|offset| appended.bytes.get(offset..));

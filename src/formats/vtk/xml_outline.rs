@@ -28,6 +28,8 @@ pub(super) struct Piece<'a> {
     /// How many cells each section has, in the order of [`Section::ALL`].
     pub cells: [u64; 5],
     pub arrays: Vec<(Role, Array<'a>)>,
+    /// What there is more than one array for, if anything: the first one counts.
+    pub twice: Option<Role>,
 }
 
 /// Where cells are listed.
@@ -75,6 +77,14 @@ pub(super) enum Role {
     Connectivity(Section),
     Offsets(Section),
     Types,
+    Field(Field),
+}
+
+/// Values at points or cells, by their name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Field {
+    OfPoints(&'static str),
+    OfCells(&'static str),
 }
 
 impl Role {
@@ -84,6 +94,7 @@ impl Role {
             Self::Connectivity(section) => format!("connectivity of {}", section.name()),
             Self::Offsets(section) => format!("offsets of {}", section.name()),
             Self::Types => "types of Cells".to_owned(),
+            Self::Field(Field::OfPoints(name) | Field::OfCells(name)) => format!("values of \"{name}\""),
         }
     }
 }
@@ -126,14 +137,16 @@ enum Tag {
     DataSet,
     Piece,
     Points,
+    PointData,
+    CellData,
     Section(Section),
     Array,
     Other,
 }
 
-/// Finds what is in a file.
-pub(super) fn outline(bytes: &[u8], depth: usize) -> Result<Outline<'_>, VtkError> {
-    let mut search = Search::new(bytes, depth);
+/// Finds what is in a file: the surface, and these fields.
+pub(super) fn outline<'a>(bytes: &'a [u8], depth: usize, fields: &'static [Field]) -> Result<Outline<'a>, VtkError> {
+    let mut search = Search::new(bytes, depth, fields);
     while search.step()? {}
     search.finish()
 }
@@ -142,6 +155,7 @@ pub(super) fn outline(bytes: &[u8], depth: usize) -> Result<Outline<'_>, VtkErro
 struct Search<'a> {
     bytes: &'a [u8],
     depth: usize,
+    fields: &'static [Field],
     reader: Reader<&'a [u8]>,
     /// The elements around the place at hand, from the outermost.
     path: Vec<Tag>,
@@ -153,12 +167,12 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(bytes: &'a [u8], depth: usize) -> Self {
+    fn new(bytes: &'a [u8], depth: usize, fields: &'static [Field]) -> Self {
         let mut reader = Reader::from_reader(bytes);
         reader.config_mut().expand_empty_elements = true;
         let packing = Packing { order: Order::Little, wide: false, compressor: None };
         let (path, pieces) = (Vec::new(), Vec::new());
-        Self { bytes, depth, reader, path, kind: None, packing, pieces, appended: None }
+        Self { bytes, depth, fields, reader, path, kind: None, packing, pieces, appended: None }
     }
 
     /// The byte after what was read last.
@@ -219,9 +233,8 @@ impl<'a> Search<'a> {
                 self.piece(tag)?;
                 Tag::Piece
             }
-            ([.., Tag::Piece], "Points") => Tag::Points,
-            ([.., Tag::Piece], name) => section(name).map_or(Tag::Other, Tag::Section),
-            ([.., parent @ (Tag::Points | Tag::Section(_))], "DataArray") => match role(*parent, tag) {
+            ([.., Tag::Piece], name) => part(name),
+            ([.., parent], "DataArray") => match role(*parent, tag, self.fields) {
                 Some(role) => self.array(tag, role)?,
                 None => Tag::Other,
             },
@@ -297,7 +310,11 @@ impl<'a> Search<'a> {
         let array = Array { at: self.at(), scalar, components, data };
         match self.pieces.last_mut() {
             Some(piece) if piece.array(role).is_none() => piece.arrays.push((role, array)),
-            _ => return Ok(Tag::Other),
+            Some(piece) => {
+                piece.twice = Some(role);
+                return Ok(Tag::Other);
+            }
+            None => return Ok(Tag::Other),
         }
         Ok(Tag::Array)
     }
@@ -373,18 +390,29 @@ impl<'a> Piece<'a> {
     }
 }
 
-fn section(name: &str) -> Option<Section> {
-    Section::ALL.into_iter().find(|s| s.name() == name)
+/// The part of a piece that an element of this name is.
+fn part(name: &str) -> Tag {
+    match name {
+        "Points" => Tag::Points,
+        "PointData" => Tag::PointData,
+        "CellData" => Tag::CellData,
+        _ => Section::ALL.into_iter().find(|s| s.name() == name).map_or(Tag::Other, Tag::Section),
+    }
 }
 
 /// What an array in this element is for.
-fn role(parent: Tag, tag: &BytesStart) -> Option<Role> {
-    match (parent, attribute(tag, "Name").unwrap_or_default()) {
+fn role(parent: Tag, tag: &BytesStart, fields: &[Field]) -> Option<Role> {
+    let name = attribute(tag, "Name").unwrap_or_default();
+    let field = |field: &&Field| match **field {
+        Field::OfPoints(wanted) => parent == Tag::PointData && wanted == name,
+        Field::OfCells(wanted) => parent == Tag::CellData && wanted == name,
+    };
+    match (parent, name) {
         (Tag::Points, _) => Some(Role::Points),
         (Tag::Section(section), "connectivity") => Some(Role::Connectivity(section)),
         (Tag::Section(section), "offsets") => Some(Role::Offsets(section)),
         (Tag::Section(Section::Cells), "types") => Some(Role::Types),
-        _ => None,
+        _ => fields.iter().find(field).map(|f| Role::Field(*f)),
     }
 }
 

@@ -1,16 +1,15 @@
-//! surface.vtu and param.vtu, by `vtkio`: written for ParaView, read again by `planish check`.
+//! surface.vtu and param.vtu: written for ParaView by `vtkio`, and read again by `planish check`.
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
+use super::error::VtkError;
+pub use super::read_back::read;
 use pipeline::atlas::Chart;
 use pipeline::certify::CertifiedMap;
 use pipeline::distortion::CellFields;
 use pipeline::mesh::SurfaceMesh;
 use pipeline::space::midpoint;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use vtkio::model::{
-    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, IOBuffer, Piece, UnstructuredGridPiece,
-    Version, VertexNumbers, Vtk,
+    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, IOBuffer, UnstructuredGridPiece, Version,
+    VertexNumbers, Vtk,
 };
 use vtkio::xml::Compressor;
 
@@ -36,6 +35,9 @@ pub enum VtuError {
     /// `vtkio` says why.
     #[error("{0}")]
     Library(String),
+    /// The file is no VTU file, or a damaged one.
+    #[error(transparent)]
+    Damaged(#[from] VtkError),
     /// The file holds something else than planish writes.
     #[error(
         "{0}: missing, twice there, or of the wrong size or type; the file was not written by planish, or was damaged"
@@ -176,105 +178,4 @@ fn cell_fields(views: &[ChartView]) -> Vec<Attribute> {
         array("untangled", 1, untangled),
         array("colour", 1, colour),
     ]
-}
-
-/// How every file of planish's begins.
-const HEAD: &str = "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" \
-                    compressor=\"vtkLZ4DataCompressor\">";
-
-/// Reads a file that planish wrote.
-///
-/// # Errors
-/// [`VtuError`]; `vtkio` panics on some damaged files, which becomes an error here too.
-pub fn read(bytes: &[u8]) -> Result<Grid, VtuError> {
-    if !bytes.starts_with(HEAD.as_bytes()) || !sizes_are_plausible(bytes) {
-        return Err(VtuError::Content("the header"));
-    }
-    let parsed = catch_unwind(AssertUnwindSafe(|| Vtk::parse_xml(bytes)));
-    let vtk = parsed.map_err(|_| VtuError::Library("the file is damaged".to_owned()))?;
-    let vtk = vtk.map_err(|e| VtuError::Library(e.to_string()))?;
-    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { return Err(VtuError::Content("UnstructuredGrid")) };
-    let [Piece::Inline(piece)] = &pieces[..] else { return Err(VtuError::Content("Piece")) };
-    grid(piece)
-}
-
-/// Whether the sizes that compressed arrays declare can be true: LZ4 packs at most 255 bytes into one. `vtkio`
-/// takes the memory before it looks.
-fn sizes_are_plausible(bytes: &[u8]) -> bool {
-    let text = String::from_utf8_lossy(bytes);
-    let arrays = text.split("<DataArray ").skip(1).filter_map(|a| a.split_once('>')).map(|(_, data)| data);
-    arrays.into_iter().all(|data| {
-        let header = data.get(..32).and_then(|h| BASE64_STANDARD.decode(h).ok());
-        let numbers = header.map(|h| {
-            h.chunks_exact(8)
-                .map(|n| u64::from_le_bytes([n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7]]))
-                .collect::<Vec<_>>()
-        });
-        let Some([blocks, block, last]) = numbers.as_deref() else { return false };
-        let limit = 256 * bytes.len() as u64;
-        *blocks <= limit && *last <= *block && blocks.checked_mul(*block).is_some_and(|total| total <= limit)
-    })
-}
-
-fn grid(piece: &UnstructuredGridPiece) -> Result<Grid, VtuError> {
-    let (of_points, of_cells) = (&piece.data.point[..], &piece.data.cell[..]);
-    let points = doubles(&piece.points).ok_or(VtuError::Content("Points"))?;
-    let points: Vec<[f64; 3]> = points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-    let cells = cells(&piece.cells, points.len()).ok_or(VtuError::Content("Cells"))?;
-    let (n, m) = (points.len(), cells.len());
-    let uv = named(of_points, "uv").and_then(doubles).filter(|d| d.len() == 2 * n).ok_or(VtuError::Content("uv"))?;
-    let whole = |attributes, name: &'static str, length: usize| {
-        let data = named(attributes, name).and_then(|d| if let IOBuffer::I32(v) = d { Some(v) } else { None });
-        data.filter(|d| d.len() == length).cloned().ok_or(VtuError::Content(name))
-    };
-    let field = |name: &'static str| {
-        named(of_cells, name).and_then(doubles).filter(|d| d.len() == m).ok_or(VtuError::Content(name))
-    };
-    let all = [
-        field("det_min")?,
-        field("det_max")?,
-        field("jacobian_ratio")?,
-        field("conformal_distortion")?,
-        field("area_scale")?,
-    ];
-    let fields = (0..m).map(|i| CellFields {
-        det_min: all[0][i],
-        det_max: all[1][i],
-        jacobian_ratio: all[2][i],
-        conformal_distortion: all[3][i],
-        area_scale: all[4][i],
-    });
-    Ok(Grid {
-        uv: uv.chunks_exact(2).map(|p| [p[0], p[1]]).collect(),
-        vertex: whole(of_points, "vertex", n)?,
-        chart: whole(of_cells, "chart", m)?,
-        triangle: whole(of_cells, "triangle", m)?,
-        fields: fields.collect(),
-        points,
-        cells,
-    })
-}
-
-/// The data of the only array of this name.
-fn named<'a>(attributes: &'a [Attribute], name: &str) -> Option<&'a IOBuffer> {
-    let mut all = attributes.iter().filter_map(|a| match a {
-        Attribute::DataArray(d) if d.name == name => Some(&d.data),
-        _ => None,
-    });
-    all.next().filter(|_| all.next().is_none())
-}
-
-fn doubles(buffer: &IOBuffer) -> Option<&Vec<f64>> {
-    if let IOBuffer::F64(v) = buffer { Some(v) } else { None }
-}
-
-/// The nodes of the cells, if all of them are 6-node triangles of existing points.
-fn cells(cells: &Cells, points: usize) -> Option<Vec<[u32; 6]>> {
-    let VertexNumbers::XML { connectivity, offsets } = &cells.cell_verts else { return None };
-    let sixes = offsets.iter().zip(1..).all(|(o, i)| *o == 6 * i);
-    let right = sixes && connectivity.len() == 6 * offsets.len() && cells.types.len() == offsets.len();
-    let in_range = connectivity.iter().all(|n| (*n as usize) < points);
-    let quadratic = cells.types.iter().all(|t| *t == CellType::QuadraticTriangle);
-    let six = |c: &[u64]| [c[0] as u32, c[1] as u32, c[2] as u32, c[3] as u32, c[4] as u32, c[5] as u32];
-    (right && in_range && quadratic).then(|| connectivity.chunks_exact(6).map(six).collect())
 }
