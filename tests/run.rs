@@ -284,3 +284,19 @@ fn info_tells_raw_and_repaired_counts() {
     let refused = planish(["info", "no/such/file.stl"]);
     assert!(refused.code == Some(1) && refused.out.contains("unreadable"), "{}", refused.out);
 }
+
+#[test]
+fn an_extension_that_lies_is_seen_through() {
+    let out = Out::new();
+    for (from, name, format) in [
+        ("disk.stl", "a.obj", "STL, binary"),
+        ("floater_five.obj", "b.stl", "OBJ"),
+        ("floater_five.obj", "c.vtu", "OBJ"),
+        ("disk.stl", "d.msh", "STL, binary"),
+    ] {
+        let bytes = std::fs::read(fixture(from)).expect("a fixture");
+        let (ended, report) = out.run_bytes(name, &bytes);
+        assert_eq!(ended.code, Some(0), "{name}: {}", ended.err);
+        assert_eq!(report.content.expect("it was read").format, format, "{name}");
+    }
+}

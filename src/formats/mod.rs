@@ -5,7 +5,7 @@ mod gltf;
 pub mod gmsh;
 mod msh;
 #[cfg(test)]
-#[path = "../../tests/fuzz/mutate.rs"]
+#[path = "../../tests/fuzz/mutate/mod.rs"]
 mod mutate;
 mod obj;
 mod place;

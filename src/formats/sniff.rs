@@ -20,8 +20,32 @@ pub(super) fn sniff(bytes: &[u8]) -> Option<Format> {
         _ if text.starts_with(b"<") && has("<VTKFile") && has("PolyData") => Some(Format::Vtp),
         // Binary files may begin with the word, too.
         _ if is_word(text, "solid") && has("facet") && has("vertex") && !text.contains(&0) => Some(Format::Stl),
+        _ if is_binary_stl(bytes) => Some(Format::Stl),
+        _ if is_obj(text) => Some(Format::Obj),
         _ => None,
     }
+}
+
+/// Whether there are exactly as many bytes as the count of a binary STL file says.
+fn is_binary_stl(bytes: &[u8]) -> bool {
+    let count = bytes.get(80..84).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
+    count > 0 && bytes.len() as u64 == 84 + 50 * u64::from(count)
+}
+
+/// The statements with which OBJ files begin.
+const STATEMENTS: [&[u8]; 10] = [b"v", b"vn", b"vt", b"o", b"g", b"s", b"f", b"mtllib", b"usemtl", b"mg"];
+
+/// Whether all complete lines are statements of OBJ, and one of them is a vertex.
+fn is_obj(head: &[u8]) -> bool {
+    let complete = head.iter().rposition(|b| *b == b'\n').map_or(&head[..0], |end| &head[..end]);
+    let mut vertices = 0;
+    let all = complete.split(|b| *b == b'\n').all(|line| {
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let statement = words.next().unwrap_or(b"#");
+        vertices += usize::from(statement == b"v" && words.count() >= 3);
+        statement.starts_with(b"#") || STATEMENTS.contains(&statement)
+    });
+    all && vertices > 0
 }
 
 /// Whether a text begins with this word, in any case.
@@ -36,7 +60,16 @@ mod tests {
 
     #[test]
     fn only_what_is_beyond_doubt_is_recognised() {
-        let cases: [(&[u8], Option<Format>); 15] = [
+        let binary = |count: u8, size: usize| {
+            let mut bytes = vec![b' '; size];
+            bytes.splice(80..84, [count, 0, 0, 0]);
+            bytes
+        };
+        assert_eq!(
+            [(2, 184), (2, 185), (0, 84)].map(|(n, size)| sniff(&binary(n, size))),
+            [Some(Format::Stl), None, None]
+        );
+        let cases: [(&[u8], Option<Format>); 19] = [
             (b"ply\nformat ascii 1.0\n", Some(Format::Ply)),
             (b"# vtk DataFile Version 3.0\n", Some(Format::Vtk)),
             (b"$MeshFormat\n4.1 0 8\n", Some(Format::Msh)),
@@ -47,7 +80,11 @@ mod tests {
             (b"SOLID a\n facet normal 0 0 1\n outer loop\n vertex 0 0 0", Some(Format::Stl)),
             (b"solid\0\0 facet vertex", None),
             (b"solids facet vertex", None),
-            (b"v 0 0 0\nv 1 0 0\n", None),
+            (b"v 0 0 0\nv 1 0 0\n", Some(Format::Obj)),
+            (b"# by hand\r\n\r\nmtllib a.mtl\r\no a b\r\nv  0 0 0\r\nf", Some(Format::Obj)),
+            (b"v 0 0 0", None),
+            (b"v 0 0\nv 1 1\n", None),
+            (b"v 0 0 0\nx 1 0 0\n", None),
             (b"plywood", None),
             (b"{\"a\": 1}", None),
             (b"<html>", None),

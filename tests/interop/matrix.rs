@@ -57,10 +57,10 @@ impl Matrix {
     }
 }
 
-/// The surface in all formats and encodings: names and contents.
-pub fn files() -> Vec<(String, Vec<u8>)> {
+/// A surface with so many points along a side, in all formats and encodings: names and contents.
+pub fn files(side: usize) -> Vec<(String, Vec<u8>)> {
     let folder = tempfile::tempdir().expect("a folder");
-    run(script("write_matrix.py").arg(folder.path()), "the surface could not be written");
+    write(folder.path(), side);
     let mut files: Vec<(String, Vec<u8>)> = std::fs::read_dir(folder.path())
         .expect("a folder")
         .map(|entry| entry.expect("an entry").path())
@@ -70,10 +70,14 @@ pub fn files() -> Vec<(String, Vec<u8>)> {
     files
 }
 
+fn write(folder: &Path, side: usize) {
+    run(script("write_matrix.py").arg(folder).arg(side.to_string()), "the surface could not be written");
+}
+
 #[test]
 fn what_vtk_meshio_and_gmsh_write_is_read_back_equal() {
     let folder = tempfile::tempdir().expect("a folder");
-    run(script("write_matrix.py").arg(folder.path()), "the surface could not be written");
+    write(folder.path(), 40);
     let matrix = std::fs::read(folder.path().join("matrix.json")).expect("written");
     let matrix: Matrix = serde_json::from_slice(&matrix).expect("JSON");
     let (mut read, mut passed_over) = (0, BTreeSet::new());

@@ -1,5 +1,5 @@
-"""write_matrix.py FOLDER: writes one surface in every format and encoding of VTK, meshio and Gmsh, and tells in
-matrix.json what should be read back.
+"""write_matrix.py FOLDER [SIZE]: writes one surface in every format and encoding of VTK, meshio and Gmsh, and tells in
+matrix.json what should be read back. SIZE is the number of points along a side.
 
 Coordinates are multiples of 1/64: text and single precision hold them exactly.
 """
@@ -13,7 +13,7 @@ import numpy
 import vtk
 from vtkmodules.util.numpy_support import numpy_to_vtk
 
-SIZE = 40
+SIZE = int(sys.argv[2]) if len(sys.argv) > 2 else 40
 
 
 def surface():
@@ -138,8 +138,19 @@ def by_vtk(add):
                 writer.SetFileVersion(version)
                 name = f"vtk_{kind}_{extension}_{version}_{'binary' if binary else 'ascii'}.vtk"
                 write_vtk(writer, held, add(name, kind.replace("strips", "triangles")))
-    for extension, writer in (("stl", vtk.vtkSTLWriter()), ("ply", vtk.vtkPLYWriter()), ("obj", vtk.vtkOBJWriter())):
-        write_vtk(writer, polydata("triangles"), add(f"vtk_triangles.{extension}", "triangles"))
+    write_vtk(vtk.vtkOBJWriter(), polydata("triangles"), add("vtk_triangles.obj", "triangles"))
+    for binary in (False, True):
+        how = "binary" if binary else "ascii"
+        for extension, writer in (("stl", vtk.vtkSTLWriter()), ("ply", vtk.vtkPLYWriter())):
+            (writer.SetFileTypeToBinary if binary else writer.SetFileTypeToASCII)()
+            write_vtk(writer, polydata("triangles"), add(f"vtk_triangles_{how}.{extension}", "triangles"))
+    writer = vtk.vtkPLYWriter()
+    writer.SetDataByteOrderToBigEndian()
+    write_vtk(writer, polydata("triangles"), add("vtk_triangles_big.ply", "triangles"))
+    for extension in ("gltf", "glb"):
+        writer = vtk.vtkGLTFWriter()
+        writer.InlineDataOn()
+        write_vtk(writer, blocks_of(polydata("triangles")), add(f"vtk_triangles.{extension}", "triangles"))
     pieces = vtk.vtkExtractPolyDataPiece()
     pieces.SetInputData(polydata("triangles"))
     pieces.CreateGhostCellsOff()
@@ -150,10 +161,18 @@ def by_vtk(add):
     assert writer.Write() == 1
 
 
+def blocks_of(data):
+    """Two levels of blocks, as the writer of glTF wants them."""
+    inner, outer = vtk.vtkMultiBlockDataSet(), vtk.vtkMultiBlockDataSet()
+    inner.SetBlock(0, data)
+    outer.SetBlock(0, inner)
+    return outer
+
+
 def write_vtk(writer, data, path):
     writer.SetInputData(data)
     writer.SetFileName(path)
-    assert writer.Write() == 1, path
+    assert writer.Write() == 1 and os.path.getsize(path) > 0, path
 
 
 def by_meshio(add):
