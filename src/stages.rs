@@ -69,7 +69,7 @@ pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -
     match formats::kind(path) {
         Kind::Mesh(format) => {
             let source = Source { bytes, limits: &settings.limits, beside: folder };
-            formats::read(format, &source).map_err(|e| e.reason())
+            formats::read_or_tell(format, &source)
         }
         Kind::OtherMesh(e) => refuse(
             Code::UnsupportedFormat,

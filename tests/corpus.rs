@@ -145,6 +145,23 @@ fn a_cracked_part_is_closed_to_its_true_genus() {
     assert_eq!((&repaired["genus"], &repaired["boundary_loops"]), (&9.into(), &0.into()));
 }
 
+/// What is said of the files that are at hand: format, place and trouble, in the words of the file's format.
+const MALFORMED: [(&str, Code, &str); 13] = [
+    ("glb_truncated_chunk.glb", Code::Malformed, "glTF, byte 8: the header declares 48 bytes, but there are 47"),
+    ("gltf_external_uri.gltf", Code::ForeignFile, "glTF, buffers[0].uri is \"http://example.com/buffer.bin\""),
+    ("gltf_missing_external_bin.gltf", Code::MissingFile, "glTF, buffers[0] lies in another file: BoxTextured0.bin"),
+    ("msh_empty.msh", Code::NoTriangles, "MSH: the file holds no triangle"),
+    ("msh_truncated_derived.msh", Code::CountMismatch, "MSH, line 3179: the file ends in section $Nodes"),
+    ("obj_index_out_of_range.obj", Code::Malformed, "OBJ, line 20: a face uses vertex 8, but the file has 6"),
+    ("obj_inf_nan.obj", Code::NotFinite, "OBJ, line 1 has the coordinate inf"),
+    ("obj_zero_bytes.obj", Code::EmptyFile, "the file is empty (0 bytes)"),
+    ("ply_truncated.ply", Code::CountMismatch, "PLY, line 46: the header declares 12 of element vertex"),
+    ("ply_wrong_face_count.ply", Code::CountMismatch, "PLY, byte 2160: the file ends in face 20 (from 0) of 22"),
+    ("stl_empty_binary.stl", Code::NoTriangles, "STL: the file holds no triangle"),
+    ("stl_wrong_triangle_count.stl", Code::CountMismatch, "STL: the header declares 22 triangles (1184 bytes)"),
+    ("vtk_lines_only.vtk", Code::NoTriangles, "VTK: the file holds no surface, only 78 lines"),
+];
+
 #[test]
 fn broken_files_do_what_the_manifest_says() {
     let Some(malformed) = shared("malformed") else { return };
@@ -154,6 +171,10 @@ fn broken_files_do_what_the_manifest_says() {
         let (_, reports) = run_all(&[malformed.join(name)], &[]);
         let report = &reports[0].1;
         let reason = report.reason.as_ref();
+        if let Some((_, code, words)) = MALFORMED.iter().find(|(file, ..)| file == name) {
+            let reason = reason.unwrap_or_else(|| panic!("{name} is not refused"));
+            assert!(reason.code == *code && reason.message.contains(words), "{name}: {reason:?}");
+        }
         if row["kind"].contains("reject") {
             let reason = reason.expect("a refusal");
             let read = [Code::NeedsSplit, Code::Internal].contains(&reason.code);

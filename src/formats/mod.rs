@@ -157,6 +157,35 @@ fn soup_reason(error: &SoupError) -> (Code, Option<String>) {
     }
 }
 
+impl std::fmt::Display for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Stl => "STL",
+            Self::Obj => "OBJ",
+            Self::Gltf => "glTF",
+            Self::Vtk => "VTK",
+            Self::Vtu => "VTU",
+            Self::Vtp => "VTP",
+            Self::Ply => "PLY",
+            Self::Msh => "MSH",
+        })
+    }
+}
+
+/// As [`read`]; the refusal begins with the format that the file was taken for.
+///
+/// # Errors
+/// The refusal.
+pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Reason> {
+    read(format, source).map_err(|error| {
+        let (format, mut reason) = (sniff::sniff(source.bytes).unwrap_or(format), error.reason());
+        let begins_with_place = reason.place.as_ref().is_some_and(|place| reason.message.starts_with(place));
+        let separator = if begins_with_place { "," } else { ":" };
+        reason.message = format!("{format}{separator} {}", reason.message);
+        reason
+    })
+}
+
 /// Reads the bytes of a file, which its name says to be in this format; where the bytes say otherwise beyond doubt, they
 /// are believed.
 ///

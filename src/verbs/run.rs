@@ -146,7 +146,8 @@ fn tell_trouble(job: &Job, end: &End) {
         End::Waiting(reason) => complain(&format!("{input}: {}", reason.message)),
         End::Lost => complain(&format!("{input}: planish broke down; that is a fault of planish: please report it")),
         End::Done(Done { report: Report { reason: Some(reason), status, .. }, .. }) => {
-            let place = reason.place.as_ref().map_or(String::new(), |p| format!(" ({p})"));
+            let untold = reason.place.as_ref().filter(|place| !reason.message.contains(place.as_str()));
+            let place = untold.map_or(String::new(), |place| format!(" ({place})"));
             complain(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
         }
         End::Done(_) | End::Later(..) | End::Unwanted => {}

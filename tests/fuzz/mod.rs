@@ -5,6 +5,7 @@
 //! `PLANISH_FUZZ=1000000 cargo test --release fuzz -- --nocapture` does a million. A file that breaks a reader is kept: made
 //! as small as it can be, it becomes a test of that reader. `guided/` looks for more where there is a nightly toolchain.
 
+mod large;
 mod mutate;
 mod seeds;
 

@@ -211,6 +211,8 @@ fn property(words: &mut Words) -> Result<Property, String> {
 /// The lines of a header. They end as the first one does: with a carriage return alone, or with a line feed.
 struct Lines<'a> {
     bytes: &'a [u8],
+    /// Whether the file goes on behind them.
+    cut: bool,
     ends_with: u8,
     /// Where the next line begins, and the number of the last one.
     end: usize,
@@ -219,11 +221,11 @@ struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     fn new(bytes: &'a [u8]) -> Self {
-        let bytes = &bytes[..bytes.len().min(HEADER)];
+        let (cut, bytes) = (bytes.len() > HEADER, &bytes[..bytes.len().min(HEADER)]);
         let first = bytes.iter().position(|b| [b'\n', b'\r'].contains(b)).unwrap_or(0);
         let pair = bytes.get(first + 1) == Some(&b'\n');
         let ends_with = if bytes.get(first) == Some(&b'\r') && !pair { b'\r' } else { b'\n' };
-        Self { bytes, ends_with, end: 0, number: 0 }
+        Self { bytes, cut, ends_with, end: 0, number: 0 }
     }
 }
 
@@ -233,10 +235,8 @@ impl<'a> Iterator for Lines<'a> {
     /// The next line, if it ends; the last one of a file that holds no values need not.
     fn next(&mut self) -> Option<&'a [u8]> {
         let rest = &self.bytes[self.end..];
-        let length = rest.iter().position(|b| *b == self.ends_with).unwrap_or(rest.len());
-        if rest.is_empty() {
-            return None;
-        }
+        let end = rest.iter().position(|b| *b == self.ends_with);
+        let length = end.or((!self.cut && !rest.is_empty()).then_some(rest.len()))?;
         self.end += (length + 1).min(rest.len());
         self.number += 1;
         Some(&rest[..length])
@@ -309,7 +309,9 @@ mod tests {
         assert!(matches!(Header::read(b"solid"), Err(PlyError::NotPly { .. })));
         assert!(matches!(Header::read(HEAD.as_bytes()), Err(PlyError::HeaderEnds { line: 2, .. })));
         let endless = format!("{HEAD}comment {}", "x".repeat(2 * HEADER));
-        assert!(matches!(Header::read(endless.as_bytes()), Err(PlyError::HeaderEnds { line: 3, .. })));
+        assert!(matches!(Header::read(endless.as_bytes()), Err(PlyError::HeaderEnds { line: 2, .. })));
+        let long = format!("{HEAD}{}", "comment\n".repeat(HEADER));
+        assert!(matches!(Header::read(long.as_bytes()), Err(PlyError::HeaderEnds { .. })));
         let many = format!("{HEAD}{}", "element a 1\n".repeat(3)).replace("a 1\nelement", "b 1\nelement");
         assert!(matches!(Header::read(many.as_bytes()), Err(PlyError::Header { line: 4, .. })));
         let crowd: String = (0..=ELEMENTS).map(|i| format!("element e{i} 0\n")).collect();

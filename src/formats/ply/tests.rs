@@ -3,7 +3,6 @@ use super::*;
 use crate::formats::mutate::mutations;
 use crate::formats::{Limits, Nothing};
 use pipeline::mesh::SoupError;
-use std::path::Path;
 
 fn content(bytes: &[u8]) -> Result<Content, ReadError> {
     read(&Source { bytes, limits: &Limits::default(), beside: &Nothing })
@@ -241,26 +240,4 @@ fn mutated_files_do_no_harm() {
         accepted += mutations(&file, 20_000).filter(|bytes| content(bytes).is_ok()).count();
     }
     assert!(accepted > 1000, "{accepted}");
-}
-
-/// The real files, where they are at hand, have the counts of their manifest.
-#[test]
-fn real_files_are_read() {
-    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
-    let Ok(manifest) = std::fs::read_to_string(shared.join("meshes/MANIFEST.tsv")) else {
-        return eprintln!("skipped: {} is not at hand", shared.display());
-    };
-    let mut lines = manifest.lines().map(|line| line.split('\t').collect::<Vec<_>>());
-    let names = lines.next().expect("a header");
-    let column = |row: &[&str], name: &str| row[names.iter().position(|n| *n == name).expect("a column")].parse().ok();
-    for row in lines.filter(|row| row[0].ends_with(".ply")) {
-        let bytes = std::fs::read(shared.join("meshes").join(row[0])).expect("a file");
-        let soup = content(&bytes).unwrap_or_else(|e| panic!("{}: {e}", row[0])).soup;
-        let counts = (Some(soup.points().len()), Some(soup.triangles().len()));
-        assert_eq!(counts, (column(&row, "vertices_file"), column(&row, "triangles_file")), "{}", row[0]);
-    }
-    for broken in ["ply_truncated.ply", "ply_wrong_face_count.ply"] {
-        let bytes = std::fs::read(shared.join("malformed").join(broken)).expect("a file");
-        assert_eq!(error(&bytes).code(), Code::CountMismatch, "{broken}");
-    }
 }
