@@ -25,7 +25,7 @@ fn rewrite(out: &Out, name: &str, file: &str, change: impl Fn(&mut UnstructuredG
     let Piece::Inline(piece) = &mut pieces[0] else { panic!("inline") };
     change(piece);
     let mut bytes = Vec::new();
-    vtk.try_into_xml_format(Compressor::LZ4, 1).expect("writable").write(&mut bytes).expect("written");
+    vtk.try_into_xml_format(Compressor::ZLib, 1).expect("writable").write(&mut bytes).expect("written");
     std::fs::write(out.of(name).join(file), bytes).expect("written");
 }
 

@@ -1,5 +1,5 @@
-//! The real VTK opens what planish writes, an independent program proves the triangles valid again, and the real Gmsh
-//! remeshes through the maps.
+//! The real VTK and meshio open what planish writes, an independent program proves the triangles valid again, and the
+//! real Gmsh remeshes through the maps.
 //!
 //! The Python environment is made beside the sources (`.venv`, not under version control) when a test first needs
 //! it, with the packages of requirements.txt.
@@ -116,4 +116,33 @@ fn every_report_follows_the_published_schema() {
     assert_eq!(reports.len(), 15);
     let schema = root().join("docs/report.schema.json");
     run(script("validate_schema.py").arg(schema).args(reports), "a report breaks the schema");
+}
+
+/// Surfaces with nothing in common but the file.
+fn several(folder: &Path) -> PathBuf {
+    let parts = [pipeline::shapes::disk(4), pipeline::shapes::sphere(6), pipeline::shapes::ring_torus(9, 6)];
+    let (mut text, mut base) = (String::new(), 1);
+    for (part, soup) in (0..).zip(&parts) {
+        soup.points().iter().for_each(|[x, y, z]| text += &format!("v {} {y} {z}\n", x + 5.0 * f64::from(part)));
+        soup.triangles().iter().for_each(|[a, b, c]| text += &format!("f {} {} {}\n", a + base, b + base, c + base));
+        base += soup.points().len() as u32;
+    }
+    let path = folder.join("several.obj");
+    std::fs::write(&path, text).expect("written");
+    path
+}
+
+/// As simulation codes in Python do, which go through meshio.
+#[test]
+fn meshio_reads_what_vtk_and_gmsh_read() {
+    let (out, inputs) = (Out::new(), tempfile::tempdir().expect("a folder"));
+    let paths = [fixture("disk.stl"), fixture("plate_genus9.stl"), several(inputs.path())];
+    let paths: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+    assert_eq!(out.run(&paths, &["-q"]).code, Some(0));
+    assert_eq!(out.report("several.obj").surface.expect("a surface").repaired.counts.components, 3);
+    let folders = ["disk.stl", "plate_genus9.stl", "several.obj"].map(|name| out.of(name));
+    assert_vtk_agrees(&folders);
+    let printed = run(script("verify_meshio.py").args(&folders), "meshio reads something else than VTK or Gmsh");
+    let said: Vec<&str> = printed.lines().collect();
+    assert!(said.len() == folders.len() && said.iter().all(|line| line.starts_with("ok ")), "{printed}");
 }

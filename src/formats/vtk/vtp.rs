@@ -1,11 +1,11 @@
 //! `seams.vtp`: the curves between charts as polylines, and corners as points, by `vtkio`.
 
+use super::vtu::COMPRESSOR;
 use pipeline::mesh::SurfaceMesh;
 use pipeline::seams::{Curve, SeamNetwork};
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version, VertexNumbers, Vtk,
 };
-use vtkio::xml::Compressor;
 
 /// `vtkio` cannot write the file.
 #[derive(Debug, thiserror::Error)]
@@ -44,7 +44,7 @@ pub fn seams(mesh: &SurfaceMesh, network: &SeamNetwork) -> Result<Vec<u8>, VtpEr
     };
     let library = |e: &dyn std::fmt::Display| VtpError(e.to_string());
     let mut bytes = Vec::new();
-    let file = vtk.try_into_xml_format(Compressor::LZ4, 1).map_err(|e| library(&e))?;
+    let file = vtk.try_into_xml_format(COMPRESSOR, 1).map_err(|e| library(&e))?;
     file.write(&mut bytes).map_err(|e| library(&e))?;
     Ok(bytes)
 }

@@ -13,6 +13,9 @@ use vtkio::model::{
 };
 use vtkio::xml::Compressor;
 
+/// What every reader can unpack: meshio does not know LZ4.
+pub(super) const COMPRESSOR: Compressor = Compressor::ZLib;
+
 /// A chart with everything that its part of the files shows.
 pub struct ChartView<'a> {
     /// The surface it belongs to.
@@ -133,7 +136,7 @@ fn encode(
     };
     let library = |e: &dyn std::fmt::Display| VtuError::Library(e.to_string());
     let mut bytes = Vec::new();
-    let file = vtk.try_into_xml_format(Compressor::LZ4, 1).map_err(|e| library(&e))?;
+    let file = vtk.try_into_xml_format(COMPRESSOR, 1).map_err(|e| library(&e))?;
     file.write(&mut bytes).map_err(|e| library(&e))?;
     Ok(bytes)
 }
