@@ -234,20 +234,20 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
         let _in_stage = travel.in_stage(Stage::Read);
         return unwritten(&travel, error);
     }
-    let content = stages::read_input(&travel.job.path, &travel.shared.settings);
+    let content = stages::read_input(&travel.job, &travel.shared.settings);
     if !travel.job.is_unchanged() {
         return travel.end(End::Changed);
     }
     let Shared { settings, publisher, .. } = &*travel.shared;
     let mut report = Report::new(input(&travel.job, content.as_deref().ok()), settings);
-    let folder = stages::Folder::of(&travel.job.path);
+    let folder = stages::Folder::of_job(&travel.job);
     let decoded = travel.compute(Stage::Read, |_| {
         let bytes = content?;
         report.input.blake3 = Some(blake3::hash(&bytes).to_hex().to_string());
         let older = if settings.force {
             None
         } else {
-            ledger::up_to_date(&publisher.target(&travel.job.name), &report, &travel.job.path)
+            ledger::up_to_date(&publisher.target(&travel.job.name), &report, &folder)
         };
         Ok(match older {
             Some(older) => Err(older),

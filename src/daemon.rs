@@ -3,8 +3,8 @@
 use crate::conveyor::{Conveyor, Ended};
 use crate::inbox::{Change, Inbox};
 use crate::job::{End, Job};
-use crate::logging::shown;
 use crate::settings::Settings;
+use crate::shown::shown;
 use crate::status::{Counts, Lock, NAMED, Progress, Status};
 use crate::watch::{Event, Eyes, Stop};
 use std::collections::BTreeMap;

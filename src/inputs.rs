@@ -2,13 +2,14 @@
 
 use crate::formats::{Kind, kind};
 use crate::job::Job;
+use crate::shown::shown;
 use std::path::{Path, PathBuf};
 
 /// Why inputs are refused as a whole: wrong usage.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// A folder cannot be listed.
-    #[error("cannot list {path}: {error}")]
+    #[error("cannot list {}: {error}", shown(.path))]
     Unreadable {
         /// The path.
         path: PathBuf,
@@ -16,17 +17,18 @@ pub enum InputError {
         error: std::io::Error,
     },
     /// A folder holds no mesh.
-    #[error("the folder {0} holds no mesh file; name a file or another folder")]
+    #[error("the folder {} holds no mesh file; name a file or another folder", shown(.0))]
     EmptyFolder(PathBuf),
     /// A path does not end in a name.
-    #[error("{0} does not name a file")]
+    #[error("{} does not name a file", shown(.0))]
     NoName(PathBuf),
     /// An input lies in the output folder itself.
-    #[error("{0} lies in the output folder, where its result would take its place; use another output folder")]
+    #[error("{} lies in the output folder, where its result would take its place; use another output folder", shown(.0))]
     InsideOut(PathBuf),
     /// Two inputs have the same name.
     #[error(
-        "{0} and {1} have the same name, so that their results would overwrite each other; rename one, or use two output folders"
+        "{} and {} have the same name, so that their results would overwrite each other; rename one, or use two output folders",
+        shown(.0), shown(.1)
     )]
     SameName(PathBuf, PathBuf),
 }
@@ -86,18 +88,19 @@ fn folder(path: &Path) -> Result<Vec<Job>, InputError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(path).map_err(unreadable(path))? {
         let file = entry.map_err(unreadable(path))?.path();
-        let mesh = matches!(kind(&file), Kind::Mesh(_) | Kind::OtherMesh(_));
-        if file.is_file() && mesh {
+        // What is no file, or a link that leads nowhere or out of the folder, becomes a job too: it is refused.
+        let mesh = !file.is_dir() && matches!(kind(&file), Kind::Mesh(_) | Kind::OtherMesh(_));
+        if mesh {
             files.push(file);
-        } else if file.is_file() {
-            tracing::info!(file = %file.display(), "passed over: no mesh");
+        } else {
+            tracing::info!(file = shown(&file), "passed over: no mesh");
         }
     }
     if files.is_empty() {
         return Err(InputError::EmptyFolder(path.to_owned()));
     }
     files.sort();
-    Ok(files.into_iter().map(Job::of_file).collect())
+    Ok(files.into_iter().map(|file| Job::of_folder(path, file)).collect())
 }
 
 #[cfg(test)]

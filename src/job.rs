@@ -3,8 +3,10 @@
 use crate::look::Look;
 use crate::outcome::Reason;
 use crate::publish::PublishError;
+use crate::regular::{self, OpenError};
 use crate::report::Report;
 use parking_lot::Mutex;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -22,6 +24,8 @@ pub struct Job {
     pub look: Option<Look>,
     /// Since when it looks like that, where it lies in an inbox.
     pub since: Option<Instant>,
+    /// The folder out of which no link may lead; none where the user named the file itself.
+    pub within: Option<PathBuf>,
     unwanted: AtomicBool,
     beside: Mutex<Vec<String>>,
 }
@@ -105,7 +109,8 @@ pub struct Done {
 impl Job {
     /// The job for a file whose result goes to `name`.
     pub fn new(path: PathBuf, name: PathBuf, bytes: u64) -> Self {
-        Self { path, name, bytes, look: None, since: None, unwanted: AtomicBool::new(false), beside: Mutex::default() }
+        let (unwanted, beside) = (AtomicBool::new(false), Mutex::default());
+        Self { path, name, bytes, look: None, since: None, within: None, unwanted, beside }
     }
 
     /// The job for a file that is named: its result has its name.
@@ -115,9 +120,26 @@ impl Job {
         Self { look, ..Self::new(path, name, look.map_or(0, |look| look.bytes)) }
     }
 
+    /// The job for a file in a folder that is named.
+    pub fn of_folder(folder: &Path, path: PathBuf) -> Self {
+        Self { within: Some(folder.to_owned()), ..Self::of_file(path) }
+    }
+
     /// The job for a file that was seen in the folder `inbox` under the relative path `name`, and has not changed `since`.
     pub fn of_inbox(inbox: &Path, name: &Path, look: Look, since: Instant) -> Self {
-        Self { look: Some(look), since: Some(since), ..Self::new(inbox.join(name), name.to_owned(), look.bytes) }
+        let (path, look, since, within) = (inbox.join(name), Some(look), Some(since), Some(inbox.to_owned()));
+        Self { since, within, look, ..Self::new(path, name.to_owned(), look.map_or(0, |look| look.bytes)) }
+    }
+
+    /// Opens the file.
+    ///
+    /// # Errors
+    /// Where it is none, or must not be opened.
+    pub fn open(&self) -> Result<File, OpenError> {
+        match &self.within {
+            Some(folder) => regular::open_inside(folder, &self.path),
+            None => regular::open(&self.path),
+        }
     }
 
     /// Nobody wants the result any more: work ends at the next safe point, and nothing is published.

@@ -2,21 +2,20 @@
 
 use crate::outcome::{Reason, Status};
 use crate::report::{self, Input, Output, Report};
-use crate::stages::{beside, read_file};
+use crate::stages::{Folder, read_file};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use walkdir::{DirEntry, WalkDir};
 
-/// The report published in `folder`, if it is that of the same content, settings and version as `fresh`, of the file at
-/// `path` and those beside it, and its files are there, unharmed. A failure is none: another version may do better, or
-/// another day.
-pub fn up_to_date(folder: &Path, fresh: &Report, path: &Path) -> Option<Report> {
+/// The report published in `folder`, if it is that of the same content, settings and version as `fresh`, of a file and
+/// those `beside` it, and its files are there, unharmed. A failure is none: another version may do better, or another
+/// day.
+pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Folder) -> Option<Report> {
     let older: Report = serde_json::from_slice(&read_file(&folder.join(report::FILE)).ok()?).ok()?;
-    // The same content names the same files beside it.
-    let beside = |o: &Output| beside(path, &o.file, o.bytes).is_ok_and(|content| Output::of(&o.file, &content) == *o);
     let same = Input { beside: vec![], ..older.input.clone() } == fresh.input
         && fresh.input.blake3.is_some()
-        && older.input.beside.iter().all(beside)
+        // The same content names the same files beside it.
+        && older.input.beside.iter().all(|read| beside.still_has(read))
         && older.settings == fresh.settings
         && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
         && older.status != Status::Failed;
@@ -45,7 +44,7 @@ pub fn entries(out: &Path) -> impl Iterator<Item = (PathBuf, Entry)> {
             let Ok(found) = folders.next()? else { continue };
             if is_hidden(&found) && found.file_type().is_dir() {
                 folders.skip_current_dir();
-            } else if found.file_name() == report::FILE {
+            } else if found.file_name() == report::FILE && found.file_type().is_file() {
                 folders.skip_current_dir();
                 let entry = read_file(found.path()).ok().and_then(|text| serde_json::from_slice(&text).ok());
                 let name = found.path().parent().and_then(|p| p.strip_prefix(&out).ok()).map(Path::to_owned);

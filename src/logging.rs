@@ -2,13 +2,7 @@
 
 use crate::settings::{Log, Settings};
 use std::io::IsTerminal;
-use std::path::Path;
 use tracing::level_filters::LevelFilter;
-
-/// A path as it may be shown: on one line, whatever its bytes.
-pub fn shown(path: &Path) -> String {
-    path.to_string_lossy().escape_debug().to_string()
-}
 
 /// Starts logging; a daemon informs without being asked. A panic becomes a log message too: it is caught per job, and told there.
 pub fn start(settings: &Settings, is_daemon: bool) {

@@ -1,5 +1,6 @@
 //! How an input ended: certified, refused or failed, and why.
 
+use crate::shown::printable;
 use serde::{Deserialize, Serialize};
 
 /// The state of an input.
@@ -77,7 +78,12 @@ pub struct Reason {
 impl Reason {
     /// A reason without a place.
     pub fn new(code: Code, message: impl ToString) -> Self {
-        Self { code, message: message.to_string(), place: None }
+        Self::at(code, message, None)
+    }
+
+    /// A reason with its place, where there is one. Both may quote the file.
+    pub fn at(code: Code, message: impl ToString, place: Option<String>) -> Self {
+        Self { code, message: printable(&message.to_string()), place: place.map(|place| printable(&place)) }
     }
 
     /// The state that this reason leads to.

@@ -1,5 +1,6 @@
 //! Where folders lie to each other.
 
+use crate::shown::shown;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -23,11 +24,11 @@ pub enum PlaceError {
     /// One lies in the other.
     #[error(
         "the {} {} and the {} {} lie in each other: what is written to one would be taken for what is dropped into the \
-         other; use two separate folders", .0.0, .0.1.display(), .1.0, .1.1.display()
+         other; use two separate folders", .0.0, shown(&.0.1), .1.0, shown(&.1.1)
     )]
     Nested((&'static str, PathBuf), (&'static str, PathBuf)),
     /// A path leads nowhere.
-    #[error("the {role} {path}: {error}")]
+    #[error("the {role} {}: {error}", shown(.path))]
     Unknown {
         /// What the folder is for.
         role: &'static str,

@@ -5,6 +5,7 @@
 //! lock; folders whose process is gone are cleared at the next start. What is published is the ledger of what was done:
 //! see [`crate::ledger`].
 
+use crate::shown::shown;
 use parking_lot::Mutex;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
@@ -33,7 +34,7 @@ pub struct Publisher {
 #[derive(Debug, thiserror::Error)]
 pub enum PublishError {
     /// The system refuses.
-    #[error("cannot write {path}: {error}; check that the disk has room and the folder may be written")]
+    #[error("cannot write {}: {error}; check that the disk has room and the folder may be written", shown(.path))]
     Io {
         /// Where.
         path: PathBuf,
@@ -45,11 +46,12 @@ pub enum PublishError {
     Report(serde_json::Error),
     /// Something stands where the result belongs.
     #[error(
-        "{0} is there already and is no result of planish: it was left alone; move it away or use another output folder"
+        "{} is there already and is no result of planish: it was left alone; move it away or use another output folder",
+        shown(.0)
     )]
     Foreign(PathBuf),
     /// A folder on the way is itself a result.
-    #[error("{0} is the result of an input: another result cannot lie in it; rename the folder in the inbox")]
+    #[error("{} is the result of an input: another result cannot lie in it; rename the folder in the inbox", shown(.0))]
     Nested(PathBuf),
 }
 
@@ -136,7 +138,7 @@ impl Publisher {
     pub fn admits(&self, name: &Path) -> Result<(), PublishError> {
         let target = self.target(name);
         let parents = name.ancestors().skip(1).filter(|p| !p.as_os_str().is_empty()).map(|p| self.out.join(p));
-        if let Some(result) = parents.into_iter().find(|p| p.join(crate::report::FILE).exists()) {
+        if let Some(result) = parents.into_iter().find(|p| p.join(crate::report::FILE).is_file()) {
             return Err(PublishError::Nested(result));
         }
         if is_plain(name) && may_be_replaced(&target) { Ok(()) } else { Err(PublishError::Foreign(target)) }
@@ -234,7 +236,7 @@ fn clear_stale(staging: &Path) {
         let lock = File::open(folder.join(LOCK));
         let held = lock.as_ref().is_ok_and(|f| matches!(f.try_lock(), Err(TryLockError::WouldBlock)));
         if !held && let Err(error) = fs::remove_dir_all(&folder) {
-            tracing::warn!(folder = %folder.display(), %error, "cannot clear an abandoned staging folder");
+            tracing::warn!(folder = shown(&folder), %error, "cannot clear an abandoned staging folder");
         }
     }
 }

@@ -4,8 +4,8 @@
 //! is removed is what was processed, even where something else takes its name at the same moment. What is left in such a
 //! folder when the program is killed goes back to its place at the next start ([`recover`]).
 
-use crate::logging::shown;
 use crate::look::Look;
+use crate::shown::shown;
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ pub enum Way<'a> {
 
 /// Why an input is not put away.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot put the input {path} away: {error}; check the permissions of its folder and of the one it goes to")]
+#[error("cannot put the input {} away: {error}; check the permissions of its folder and of the one it goes to", shown(.path))]
 pub struct PutAwayError {
     /// The file.
     path: PathBuf,
@@ -84,7 +84,7 @@ fn keep_at(file: &Path, place: &Path) -> io::Result<PathBuf> {
             ended => return ended.map(|()| place),
         }
     }
-    Err(io::Error::new(ErrorKind::AlreadyExists, format!("{} and {MOST_COPIES} numbered names exist", place.display())))
+    Err(io::Error::new(ErrorKind::AlreadyExists, format!("{} and {MOST_COPIES} numbered names exist", shown(place))))
 }
 
 /// Puts a second name of `file`, or where that cannot be a copy, at `place`, if nothing is there.

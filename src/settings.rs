@@ -4,6 +4,7 @@ mod values;
 
 use crate::formats::Limits;
 use crate::hooks::{Hook, HookRefused};
+use crate::shown::shown;
 use bytesize::ByteSize;
 use pipeline::Order;
 use serde::Deserialize;
@@ -159,7 +160,7 @@ pub enum SettingsError {
         error: HookRefused,
     },
     /// The file cannot be read.
-    #[error("cannot read the settings file {path}: {error}")]
+    #[error("cannot read the settings file {}: {error}", shown(.path))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -167,7 +168,7 @@ pub enum SettingsError {
         error: std::io::Error,
     },
     /// The file makes no sense.
-    #[error("{path}: {error}")]
+    #[error("{}: {error}", shown(.path))]
     Syntax {
         /// The file.
         path: PathBuf,

@@ -2,8 +2,10 @@
 
 use crate::formats::{self, Beside, Content, Kind, READ, Source, vtm, vtp, vtu};
 use crate::hand_off;
-use crate::job::Stopped;
+use crate::job::{Job, Stopped};
+use crate::look::Look;
 use crate::outcome::{Code, Reason, Status};
+use crate::regular::{self, OpenError};
 use crate::report::{self, Decomposition, Output, Report};
 use crate::settings::{self, Settings};
 use pipeline::atlas::{Atlas, Chart};
@@ -34,17 +36,17 @@ pub fn guard<T, E: From<Reason>>(work: impl FnOnce() -> Result<T, E>) -> Result<
     })
 }
 
-/// Reads an input, as far as it is not too large.
+/// Reads an input, as far as it is not too large. What is read is the file that was seen, whatever took its name since.
 ///
 /// # Errors
 /// The refusal.
-pub fn read_input(path: &Path, settings: &Settings) -> Result<Vec<u8>, Reason> {
-    let (size, most) = (std::fs::metadata(path).map_or(0, |m| m.len()), settings.limits.file);
-    if size > most {
-        let remedy = "split or decimate it, or raise `file` in the table [limits] of planish.toml";
-        return Err(Reason::new(Code::TooLarge, format!("the file has {size} bytes, more than {most}: {remedy}")));
+pub fn read_input(job: &Job, settings: &Settings) -> Result<Vec<u8>, Reason> {
+    let file = job.open().map_err(unreadable)?;
+    let is_seen = |seen: &Look| file.metadata().is_ok_and(|m| Look::of(&m) == *seen);
+    if !job.look.as_ref().is_none_or(is_seen) {
+        return Err(Reason::new(Code::Unreadable, "the file changed when it was opened; try again"));
     }
-    read_file(path)
+    regular::read(&file, settings.limits.file).map_err(unreadable)
 }
 
 /// Reads a regular file whole. Anything else (a folder, a pipe, a device) could block for ever.
@@ -52,12 +54,17 @@ pub fn read_input(path: &Path, settings: &Settings) -> Result<Vec<u8>, Reason> {
 /// # Errors
 /// Why it cannot be read.
 pub fn read_file(path: &Path) -> Result<Vec<u8>, Reason> {
-    let unreadable = |why: String| Reason::new(Code::Unreadable, format!("cannot read the file: {why}"));
-    let metadata = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?;
-    if !metadata.is_file() {
-        return Err(unreadable("it is no regular file".to_owned()));
+    regular::open(path).and_then(|file| regular::read(&file, u64::MAX)).map_err(unreadable)
+}
+
+fn unreadable(error: OpenError) -> Reason {
+    match error {
+        OpenError::TooLarge { size, most } => {
+            let remedy = "split or decimate it, or raise `file` in the table [limits] of planish.toml";
+            Reason::new(Code::TooLarge, format!("the file has {size} bytes, more than {most}: {remedy}"))
+        }
+        other => Reason::new(Code::Unreadable, format!("cannot read the file: {other}")),
     }
-    std::fs::read(path).map_err(|e| unreadable(e.to_string()))
 }
 
 /// Decodes the bytes of the file at `path` by its extension; others may lie beside it in `folder`.
@@ -65,7 +72,7 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, Reason> {
 /// # Errors
 /// The refusal, with the place and what to do.
 pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -> Result<Content, Reason> {
-    let refuse = |code, message: String| Err(Reason { code, message, place: Some("file name".to_owned()) });
+    let refuse = |code, message: String| Err(Reason::at(code, message, Some("file name".to_owned())));
     match formats::kind(path) {
         Kind::Mesh(format) => {
             let source = Source { bytes, limits: &settings.limits, beside: folder };
@@ -90,13 +97,19 @@ pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -
 /// The folder of a file, and what was asked for in it.
 pub struct Folder<'a> {
     of: &'a Path,
+    within: Option<&'a Path>,
     asked: RefCell<Vec<(String, Option<Output>)>>,
 }
 
 impl<'a> Folder<'a> {
     /// The folder of the file at this path.
     pub fn of(path: &'a Path) -> Self {
-        Self { of: path, asked: RefCell::default() }
+        Self { of: path, within: None, asked: RefCell::default() }
+    }
+
+    /// The folder of an input.
+    pub fn of_job(job: &'a Job) -> Self {
+        Self { within: job.within.as_deref(), ..Self::of(&job.path) }
     }
 
     /// The names of the files that were asked for, there or not.
@@ -108,34 +121,33 @@ impl<'a> Folder<'a> {
     pub fn read(&self) -> Vec<Output> {
         self.asked.borrow().iter().filter_map(|(_, read)| read.clone()).collect()
     }
+
+    /// Whether a file still is what was read once.
+    pub fn still_has(&self, read: &Output) -> bool {
+        self.bytes(&read.file, read.bytes).is_ok_and(|bytes| Output::of(&read.file, &bytes) == *read)
+    }
+
+    /// The bytes of a regular file, no link, of at most `most` bytes; or why there are none, for people.
+    fn bytes(&self, name: &str, most: u64) -> Result<Vec<u8>, String> {
+        let path = self.of.with_file_name(name);
+        if path.file_name() != Some(name.as_ref()) {
+            return Err(format!("{name} is no plain name"));
+        }
+        let opened = match self.within.and_then(|folder| Some((folder, path.strip_prefix(folder).ok()?))) {
+            Some((folder, name)) => regular::open_below(folder, name),
+            None => regular::open_itself(&path),
+        };
+        opened.and_then(|file| regular::read(&file, most)).map_err(|error| format!("{name}: {error}"))
+    }
 }
 
 impl Beside for Folder<'_> {
     fn read(&self, name: &str, most: u64) -> Result<Vec<u8>, String> {
-        let bytes = beside(self.of, name, most);
+        let bytes = self.bytes(name, most);
         let read = bytes.as_ref().ok().map(|bytes| Output::of(name, bytes));
         self.asked.borrow_mut().push((name.to_owned(), read));
         bytes
     }
-}
-
-/// The bytes of the file `name`, which lies beside the one at `path`: a regular file, no link, of at most `most` bytes.
-///
-/// # Errors
-/// Why there are none, for people.
-pub fn beside(path: &Path, name: &str, most: u64) -> Result<Vec<u8>, String> {
-    let path = path.with_file_name(name);
-    if path.file_name() != Some(name.as_ref()) {
-        return Err(format!("{name} is no plain name"));
-    }
-    let metadata = std::fs::symlink_metadata(&path).map_err(|e| format!("{name}: {e}"))?;
-    if !metadata.is_file() {
-        return Err(format!("{name} is no regular file"));
-    }
-    if metadata.len() > most {
-        return Err(format!("{name} has {} bytes, more than {most}", metadata.len()));
-    }
-    std::fs::read(&path).map_err(|e| format!("{name}: {e}"))
 }
 
 /// Repairs a soup as the settings say.

@@ -7,6 +7,7 @@ use crate::conveyor::board::Running;
 use crate::look::Identity;
 use crate::outcome::{Code, Status as Outcome};
 use crate::publish::STAGING;
+use crate::shown::shown;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -111,7 +112,7 @@ pub struct Refusal {
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Another one has it.
-    #[error("another planish watch{} writes to {out} already; stop it first, or use another output folder", of_process(.pid))]
+    #[error("another planish watch{} writes to {} already; stop it first, or use another output folder", of_process(.pid), shown(.out))]
     Busy {
         /// The output folder.
         out: PathBuf,
@@ -119,7 +120,7 @@ pub enum LockError {
         pid: Option<u32>,
     },
     /// The system refuses.
-    #[error("cannot lock {path}: {error}")]
+    #[error("cannot lock {}: {error}", shown(.path))]
     Io {
         /// The lock file.
         path: PathBuf,

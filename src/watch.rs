@@ -11,8 +11,8 @@
 use crate::conveyor::{Conveyor, Ended};
 use crate::formats::{self, Kind};
 use crate::inbox::{Listing, Seen};
-use crate::logging::shown;
 use crate::look::{Identity, Look};
+use crate::shown::shown;
 use crossbeam_channel::{Receiver, Sender, after, bounded, select};
 use notify::event::{AccessKind, AccessMode, EventKind};
 use notify::{RecommendedWatcher, RecursiveMode, Watcher};

@@ -10,6 +10,8 @@ mod interop;
 mod invariants;
 mod legality;
 mod manifest;
+mod names;
+mod opening;
 mod packaging;
 mod run;
 mod support;

@@ -144,7 +144,7 @@ impl ReadError {
             Self::Msh(e) => (e.code(), e.place()),
             Self::Soup(e) => soup_reason(e),
         };
-        Reason { code, message: self.to_string(), place }
+        Reason::at(code, self, place)
     }
 }
 

@@ -15,6 +15,7 @@ mod template;
 
 use crate::report;
 use crate::settings::OnCertified;
+use crate::shown::{printable, printable_json, shown};
 use crate::stages::read_file;
 pub use account::{Account, Outcome, Ran, SCHEMA};
 use process::{Limits, Trouble};
@@ -137,7 +138,8 @@ impl Target {
 pub enum HookError {
     /// The system refuses.
     #[error(
-        "commands after certification: {path}: {error}; check that the disk has room and the folder may be written"
+        "commands after certification: {}: {error}; check that the disk has room and the folder may be written",
+        shown(.path)
     )]
     Io {
         /// Where.
@@ -146,7 +148,7 @@ pub enum HookError {
         error: io::Error,
     },
     /// There is no result.
-    #[error("commands after certification: {0} holds no report.json that can be read; process its input again")]
+    #[error("commands after certification: {} holds no report.json that can be read; process its input again", shown(.0))]
     NoReport(PathBuf),
     /// The account does not become JSON.
     #[error("hooks.json cannot be written: {0}; that is a fault of planish")]
@@ -226,7 +228,7 @@ fn run_one(hook: &Hook, target: &Target, staging: &Path, wanted: &dyn Fn() -> bo
         Err(Trouble::System(error)) => return Err(at(staging)(error)),
     };
     if let Some(Ran { command, message: Some(message), .. }) = &ran {
-        tracing::warn!(?command, "command did not succeed: {message}");
+        tracing::warn!(?command, "command did not succeed: {}", printable(message));
     }
     Ok(ran)
 }
@@ -246,12 +248,11 @@ fn told(command: &Command) -> Vec<String> {
 
 /// Writes the account at once: complete, or not there.
 fn write(account: &Account, target: &Target, staging: &Path) -> Result<(), HookError> {
-    let mut bytes = serde_json::to_vec_pretty(account).map_err(HookError::Account)?;
-    bytes.push(b'\n');
+    let text = printable_json(&serde_json::to_string_pretty(account).map_err(HookError::Account)?) + "\n";
     let parent = tempfile::tempdir_in(staging).map_err(at(staging))?;
     let fresh = parent.path().join(FILE);
     let written = File::create_new(&fresh).and_then(|mut file| {
-        file.write_all(&bytes)?;
+        file.write_all(text.as_bytes())?;
         file.sync_all()
     });
     written.map_err(at(&fresh))?;

@@ -6,6 +6,7 @@ mod build;
 use crate::formats::Notes;
 use crate::outcome::{Reason, Status};
 use crate::settings::{self, Settings};
+use crate::shown::printable_json;
 pub use build::{certificate, chart_checksum, chart_report, repairs, seams, surface};
 use pipeline::Order;
 use serde::{Deserialize, Serialize};
@@ -414,8 +415,6 @@ impl Report {
     /// # Errors
     /// Never for reports of planish's own; the signature is that of the library.
     pub fn to_json(&self) -> serde_json::Result<Vec<u8>> {
-        let mut bytes = serde_json::to_vec_pretty(self)?;
-        bytes.push(b'\n');
-        Ok(bytes)
+        Ok((printable_json(&serde_json::to_string_pretty(self)?) + "\n").into_bytes())
     }
 }

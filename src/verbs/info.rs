@@ -1,6 +1,6 @@
 //! `planish info`: what is this surface?
 
-use super::{Exit, say};
+use super::{Exit, say, say_json, shown};
 use crate::inputs;
 use crate::job::Job;
 use crate::outcome::Reason;
@@ -8,7 +8,7 @@ use crate::report::{self, Counts, Repairs, Surface};
 use crate::settings::Settings;
 use crate::stages::{Folder, decode, guard, read_input, repaired};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What `--json` prints for an input.
 #[derive(Serialize)]
@@ -31,9 +31,9 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
             exit = Exit::Refused;
         }
         if json {
-            say(&serde_json::to_string(&answer)?);
+            say_json(&answer)?;
         } else {
-            say(&text(&answer));
+            say(&text(&answer, &job.path));
         }
     }
     Ok(exit)
@@ -42,10 +42,7 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
 fn answer(job: &Job, settings: &Settings) -> Answer {
     let input = job.path.to_string_lossy().into_owned();
     let found = guard(|| {
-        repaired(
-            &decode(&job.path, &read_input(&job.path, settings)?, settings, &Folder::of(&job.path))?.soup,
-            settings,
-        )
+        repaired(&decode(&job.path, &read_input(job, settings)?, settings, &Folder::of_job(job))?.soup, settings)
     });
     match found {
         Ok(found) => Answer {
@@ -59,8 +56,8 @@ fn answer(job: &Job, settings: &Settings) -> Answer {
 }
 
 /// The answer for people.
-fn text(answer: &Answer) -> String {
-    let mut lines = vec![answer.input.escape_debug().to_string()];
+fn text(answer: &Answer, input: &Path) -> String {
+    let mut lines = vec![shown(input)];
     if let Some(reason) = &answer.reason {
         lines.push(format!("  refused: {} [{}]", reason.message, reason.code.name()));
     }

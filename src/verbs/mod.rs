@@ -19,15 +19,22 @@ const NO_OUT: &str = "no output folder: give --out DIR (or out = \"DIR\" in plan
 /// Prints a line on standard output. That nobody reads it (a closed pipe, a full disk) is no reason to stop: the
 /// exit code and the files tell the result.
 fn say(line: &str) {
-    let _ = writeln!(std::io::stdout(), "{line}");
+    let _ = writeln!(std::io::stdout(), "{}", printable_lines(line));
+}
+
+/// Prints a line of JSON.
+fn say_json(value: &impl serde::Serialize) -> serde_json::Result<()> {
+    let json = printable_json(&serde_json::to_string(value)?);
+    let _ = writeln!(std::io::stdout(), "{json}");
+    Ok(())
 }
 
 /// Prints a line on standard error, where somebody reads it.
 pub fn complain(line: &str) {
-    let _ = writeln!(std::io::stderr(), "planish: {line}");
+    let _ = writeln!(std::io::stderr(), "planish: {}", printable_lines(line));
 }
 
-use crate::logging::shown;
+use crate::shown::{printable_json, printable_lines, shown};
 
 /// Every verb says how it ended: the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

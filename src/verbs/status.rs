@@ -1,6 +1,6 @@
 //! `planish status`: what a running daemon does.
 
-use super::{Exit, say, shown};
+use super::{Exit, say, say_json, shown};
 use crate::ledger;
 use crate::outcome::Status as Outcome;
 use crate::settings::Settings;
@@ -30,9 +30,13 @@ struct Answer {
 /// Wrong usage.
 pub fn status(json: bool, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
-    std::fs::read_dir(out).map_err(|e| format!("cannot read the output folder {}: {e}", out.display()))?;
+    std::fs::read_dir(out).map_err(|e| format!("cannot read the output folder {}: {e}", shown(out)))?;
     let answer = answer(out);
-    say(&if json { serde_json::to_string(&answer)? } else { text(&answer) });
+    if json {
+        say_json(&answer)?
+    } else {
+        say(&text(&answer))
+    }
     Ok(if answer.running { Exit::Success } else { Exit::Refused })
 }
 

@@ -1,6 +1,6 @@
 //! `planish watch`: the daemon.
 
-use super::Exit;
+use super::{Exit, shown};
 use crate::conveyor::Conveyor;
 use crate::daemon::Daemon;
 use crate::places::{self, Place};
@@ -18,14 +18,14 @@ use std::sync::Arc;
 /// What makes the call as a whole impossible: wrong usage, a second daemon.
 pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
-    std::fs::read_dir(inbox).map_err(|e| format!("cannot watch {}: {e}; make the folder first", inbox.display()))?;
+    std::fs::read_dir(inbox).map_err(|e| format!("cannot watch {}: {e}; make the folder first", shown(inbox)))?;
     places::refuse_nested(&places(inbox, out, settings))?;
     let publisher = Arc::new(Publisher::open(out)?);
     let lock = Lock::take(out)?;
     put_away::recover(inbox, settings.recursive);
     let stop = signals::listen()?;
     let conveyor = Conveyor::start(settings, publisher.clone()).map_err(|e| super::no_threads(&e))?;
-    tracing::info!(inbox = %inbox.display(), out = %out.display(), "watches");
+    tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
     let ended = Daemon::new(inbox, settings, &conveyor, (&lock, publisher.staging())).run(&stop)?;
     // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more.
     publisher.close();
