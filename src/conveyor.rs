@@ -22,7 +22,7 @@ mod travel;
 pub mod turnstile;
 
 use crate::chain::{self, Followed};
-use crate::formats::Content;
+use crate::formats::{Content, Notes};
 use crate::job::{Done, End, Job, Stage, Stopped};
 use crate::ledger;
 use crate::outcome::{Code, Reason, Status};
@@ -258,6 +258,7 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
     report.input.beside = folder.read();
     match decoded {
         Ok(Ok(Content { soup, notes })) => {
+            warn_of_doubts(&travel, &notes);
             report.content = Some(notes);
             hand_on(soups, Soup { travel, report, soup });
         }
@@ -271,6 +272,18 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
             travel.end(End::Waiting(reason));
         }
         Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
+    }
+}
+
+/// Tells where a file leaves open what its surface is.
+fn warn_of_doubts(travel: &Travel, notes: &Notes) {
+    if notes.polygons_doubtful > 0 {
+        let _in_stage = travel.in_stage(Stage::Read);
+        tracing::warn!(
+            polygons = notes.polygons_doubtful,
+            "polygons cross themselves, or are too intricate: the triangles they were cut into may fold; export the \
+             surface as triangles"
+        );
     }
 }
 

@@ -54,6 +54,20 @@ fn a_chart_beyond_double_precision_is_split_until_it_maps() {
     }
 }
 
+/// A polygon that crosses itself is cut somehow, which may fold; a concave one is cut as it should be.
+#[test]
+fn polygons_that_may_fold_are_counted_and_told() {
+    let corners = "v 0 0 0\nv 2 1 0\nv 2 0 0\nv 0 1.5 0\nv 1 3 1\n";
+    let faces = [("f 1 2 3 4\nf 3 4 5\n", 1), ("f 1 3 2 4\nf 4 2 5\n", 0)];
+    for (faces, doubtful) in faces {
+        let text = [corners, faces].concat();
+        let (ended, report) = Out::new().run_bytes_with("a.obj", text.as_bytes(), &["-v"]);
+        let notes = report.content.expect("read");
+        assert_eq!((notes.polygons, notes.polygons_doubtful), (1, doubtful));
+        assert_eq!(ended.err.matches("may fold; export the surface as triangles").count(), doubtful, "{}", ended.err);
+    }
+}
+
 #[test]
 fn limits_of_charts_are_kept_and_told() {
     let out = Out::new();

@@ -89,6 +89,9 @@ pub struct Notes {
     pub names: Vec<String>,
     /// Faces with more than three corners, which were cut into triangles.
     pub polygons: usize,
+    /// How many of these cross themselves, or are too intricate to be cut with care: their triangles may fold.
+    #[serde(default)]
+    pub polygons_doubtful: usize,
     /// Nodes in the middle of edges, which were left out: edges are taken to be straight.
     pub mid_nodes: usize,
     /// What is no surface and was left out: how many elements of each kind.
@@ -107,6 +110,12 @@ impl Notes {
         if !name.is_empty() && self.names.len() < NAMES && !self.names.contains(&name) {
             self.names.push(name);
         }
+    }
+
+    /// Counts a face that was cut into triangles, which may fold where this is doubtful.
+    pub fn polygon(&mut self, is_doubtful: bool) {
+        self.polygons += 1;
+        self.polygons_doubtful += usize::from(is_doubtful);
     }
 
     /// Counts elements that are left out.

@@ -85,8 +85,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Content, ReadError> {
         for size in triangles_only.as_ref().unwrap_or(&mesh.face_arities) {
             let (face, others) = rest.split_at((*size as usize).min(rest.len()));
             let corners: Vec<u32> = face.iter().map(|i| geometry.first_used[*i as usize]).collect();
-            notes.polygons += usize::from(face.len() > 3);
-            triangles.extend(polygon::triangulate(&corners, &geometry.points));
+            let is_doubtful = polygon::add(&corners, &geometry.points, &mut triangles);
+            if face.len() > 3 {
+                notes.polygon(is_doubtful);
+            }
             rest = others;
         }
     }

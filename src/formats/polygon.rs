@@ -6,7 +6,8 @@
 //! at. Neighbours of an ear wait for the next round, which keeps the triangles small.
 //!
 //! A polygon of n corners costs [`LOOKS`] n looks at corners at most: about three seconds for a million corners, where
-//! they zigzag as wildly as can be. When the looks are used up, what is left is cut up unseen, and may fold.
+//! they zigzag as wildly as can be. When the looks are used up, what is left is cut up unseen, and may fold; so may polygons
+//! that cross themselves. Of both it is told that they are doubtful.
 
 use pipeline::space::{Vec3, cross, dot, sub};
 
@@ -14,24 +15,23 @@ use pipeline::space::{Vec3, cross, dot, sub};
 const LOOKS: usize = 1000;
 
 /// Cuts the polygon with these corner indices, all of which must be in range, into triangles. Where there is no ear, a
-/// corner is cut off all the same, so that n corners always give n - 2 triangles.
-pub(super) fn triangulate(corners: &[u32], points: &[Vec3]) -> Vec<[u32; 3]> {
-    let mut triangles = Vec::new();
-    add(corners, points, &mut triangles);
-    triangles
-}
-
-/// As [`triangulate`], adding to triangles.
-pub(super) fn add(corners: &[u32], points: &[Vec3], triangles: &mut Vec<[u32; 3]>) {
+/// corner is cut off all the same, so that n corners always give n - 2 triangles. Whether they are doubtful.
+pub(super) fn add(corners: &[u32], points: &[Vec3], triangles: &mut Vec<[u32; 3]>) -> bool {
     match corners {
-        [] | [_] | [_, _] => {}
-        [a, b, c] => triangles.push([*a, *b, *c]),
+        [] | [_] | [_, _] => false,
+        [a, b, c] => {
+            triangles.push([*a, *b, *c]);
+            false
+        }
         [others @ .., last] => {
             let normal = normal(corners, points);
             if is_seen_from_last(corners, points, normal) {
                 triangles.extend(others.windows(2).map(|edge| [*last, edge[0], edge[1]]));
+                false
             } else {
-                triangles.extend(Ears::new(corners, points, normal).cut());
+                let ears = Ears::new(corners, points, normal).cut();
+                triangles.extend(&ears.triangles);
+                ears.is_doubtful
             }
         }
     }
@@ -76,6 +76,8 @@ struct Ears<'a> {
     /// Looks that are left.
     looks: usize,
     triangles: Vec<[u32; 3]>,
+    /// Whether a corner was cut off that may be no ear.
+    is_doubtful: bool,
 }
 
 impl<'a> Ears<'a> {
@@ -91,14 +93,15 @@ impl<'a> Ears<'a> {
             reflex: Vec::new(),
             looks: LOOKS.saturating_mul(corners.len()),
             triangles: Vec::with_capacity(corners.len() - 2),
+            is_doubtful: false,
         };
         ears.reflex = (0..n).filter(|i| ears.turn(*i) <= 0.0).map(|i| (ears.flat[i as usize], i)).collect();
         ears.reflex.sort_unstable_by(|a, b| a.0[0].total_cmp(&b.0[0]).then(a.1.cmp(&b.1)));
         ears
     }
 
-    /// The triangles. All corners are tried in a first round, and in each later one those whose neighbours changed.
-    fn cut(mut self) -> Vec<[u32; 3]> {
+    /// Cuts all. All corners are tried in a first round, and in each later one those whose neighbours changed.
+    fn cut(mut self) -> Self {
         let mut tried = self.ring();
         let mut tried_all = true;
         let mut halved = self.left / 2;
@@ -115,16 +118,21 @@ impl<'a> Ears<'a> {
             }
         }
         if self.left == 3 {
+            self.is_doubtful |= self.turn(self.one) < 0.0;
             self.take(self.one);
         }
-        self.triangles
+        self
     }
 
     /// Where there is no ear, rounding is at fault, or the polygon meets itself: what is flat goes, which folds nothing,
     /// or else one corner. Gives those that lost a neighbour.
     fn without_ears(&mut self) -> Vec<u32> {
         let changed = self.round(&self.ring(), |ears, i| ears.turn(i) == 0.0);
-        if changed.is_empty() { self.take(self.one).to_vec() } else { changed }
+        if !changed.is_empty() {
+            return changed;
+        }
+        self.is_doubtful = true;
+        self.take(self.one).to_vec()
     }
 
     /// Cuts off some corners that `go` of those that are tried, no two of them neighbours. Gives those that lost one.
@@ -184,11 +192,13 @@ impl<'a> Ears<'a> {
     fn is_ear(&mut self, i: u32) -> bool {
         self.looks = self.looks.saturating_sub(1);
         if self.looks == 0 {
+            self.is_doubtful = true;
             return true;
         }
         let [a, b, c] = self.around(i).map(|k| self.flat[k as usize]);
         if turn(a, b, c) > 0.0 {
             let (held, looks) = self.holds_none(a, b, c);
+            self.is_doubtful |= looks > self.looks;
             self.looks = self.looks.saturating_sub(looks);
             return held;
         }
@@ -247,6 +257,17 @@ mod tests {
         triangles.iter().map(area).collect()
     }
 
+    fn triangulate(corners: &[u32], points: &[Vec3]) -> Vec<[u32; 3]> {
+        let mut triangles = Vec::new();
+        add(corners, points, &mut triangles);
+        triangles
+    }
+
+    fn is_doubtful(points: &[Vec3]) -> bool {
+        let corners: Vec<u32> = (0..points.len() as u32).collect();
+        add(&corners, points, &mut Vec::new())
+    }
+
     #[test]
     fn a_concave_polygon_does_not_fold() {
         // An arrow head: fanning from corner 0 would fold.
@@ -276,6 +297,15 @@ mod tests {
         };
         let points: Vec<Vec3> = (0..5).map(corner).collect();
         assert!(!is_seen_from_last(&[0, 1, 2, 3, 4], &points, [0.0, 0.0, 1.0]));
+        assert!(is_doubtful(&points));
+    }
+
+    #[test]
+    fn doubts_are_told_where_there_are_any() {
+        let bow = [[0.0, 0.0, 0.0], [2.0, 1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.5, 0.0]];
+        assert!(is_doubtful(&bow));
+        let flat = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.5, 0.0]];
+        assert!(!is_doubtful(&flat) && !is_doubtful(&flat[..3]) && !is_doubtful(&[[0.0; 3]; 6]));
     }
 
     /// Polygons around the origin, by the radius at each of their corners.
@@ -305,6 +335,7 @@ mod tests {
         areas.len() + 2 == points.len()
             && areas.iter().all(|a| *a >= 0.0)
             && (sum - expected).abs() <= 1e-9 * expected.abs()
+            && !is_doubtful(points)
     }
 
     #[test]
@@ -322,18 +353,20 @@ mod tests {
     fn many_corners_take_a_time_in_proportion() {
         let n = 50_000;
         let shapes = [
-            ("disk", around(n, |_| 2.0)),
-            ("star", around(n, |k| 2.0 + f64::from(k % 2))),
-            ("ragged", around(n, |k| 2.0 + f64::from(k.wrapping_mul(k) % 17))),
-            ("comb", comb(n)),
-            ("deep comb", deep_comb(n)),
-            ("point", vec![[0.0; 3]; n as usize]),
-            ("noise", (0..n).map(|k| [0.7123, 0.3791, 0.0].map(|s| (f64::from(k) * s).fract())).collect()),
+            ("disk", false, around(n, |_| 2.0)),
+            ("star", false, around(n, |k| 2.0 + f64::from(k % 2))),
+            ("ragged", false, around(n, |k| 2.0 + f64::from(k.wrapping_mul(k) % 17))),
+            ("comb", false, comb(n)),
+            ("deep comb", false, deep_comb(n)),
+            ("point", false, vec![[0.0; 3]; n as usize]),
+            ("noise", true, (0..n).map(|k| [0.7123, 0.3791, 0.0].map(|s| (f64::from(k) * s).fract())).collect()),
         ];
-        for (shape, points) in shapes {
+        for (shape, doubtful, points) in shapes {
             let corners: Vec<u32> = (0..n).collect();
             let start = Instant::now();
-            assert_eq!(triangulate(&corners, &points).len(), n as usize - 2, "{shape}");
+            let mut triangles = Vec::new();
+            let is_doubtful = add(&corners, &points, &mut triangles);
+            assert_eq!((triangles.len(), is_doubtful), (n as usize - 2, doubtful), "{shape}");
             assert!(start.elapsed().as_secs() < 30, "{shape}: {:?}", start.elapsed());
         }
     }

@@ -21,7 +21,8 @@ pub struct Surface<'n> {
     triangles: Vec<[u32; 3]>,
     /// Elements that are no part of a surface.
     skipped: BTreeMap<&'static str, u64>,
-    polygons: usize,
+    /// Quadrangles, and how many of them are doubtful.
+    polygons: [usize; 2],
     /// The nodes of the element at hand.
     at_hand: Vec<u64>,
     pub limits: &'n Limits,
@@ -32,7 +33,7 @@ impl<'n> Surface<'n> {
     pub fn new(nodes: Nodes, limits: &'n Limits) -> Self {
         let role = vec![0; nodes.points.len()];
         let (triangles, skipped, at_hand) = (Vec::new(), BTreeMap::new(), Vec::new());
-        Self { nodes, role, triangles, skipped, polygons: 0, at_hand, limits }
+        Self { nodes, role, triangles, skipped, polygons: [0; 2], at_hand, limits }
     }
 
     /// Counts elements that are no part of a surface.
@@ -67,8 +68,9 @@ impl<'n> Surface<'n> {
                 corners[i] = found;
             }
         }
-        self.polygons += usize::from(count > 3);
-        polygon::add(&corners[..count], &self.nodes.points, &mut self.triangles);
+        let is_doubtful = polygon::add(&corners[..count], &self.nodes.points, &mut self.triangles);
+        self.polygons[0] += usize::from(count > 3);
+        self.polygons[1] += usize::from(is_doubtful);
         let (count, limit) = (self.triangles.len() as u64, self.limits.elements);
         if count > limit { Err(MshError::TooMany { what: "triangles", count, limit }) } else { Ok(()) }
     }
@@ -79,7 +81,7 @@ impl<'n> Surface<'n> {
         for (kind, count) in self.skipped {
             notes.skip(kind, usize::try_from(count).unwrap_or(usize::MAX));
         }
-        notes.polygons = self.polygons;
+        [notes.polygons, notes.polygons_doubtful] = self.polygons;
         notes.mid_nodes = role.iter().filter(|r| **r == MID).count();
         let mut points = nodes.points;
         if notes.mid_nodes > 0 {

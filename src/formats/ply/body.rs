@@ -153,8 +153,8 @@ impl<'h> Body<'h> {
             [] | [_] | [_, _] => self.notes.skip("face with fewer than three corners", 1),
             [a, b, c] => self.triangles.push([*a, *b, *c]),
             _ => {
-                self.notes.polygons += 1;
-                polygon::add(corners, &self.points, &mut self.triangles);
+                let is_doubtful = polygon::add(corners, &self.points, &mut self.triangles);
+                self.notes.polygon(is_doubtful);
             }
         }
     }

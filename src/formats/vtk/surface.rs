@@ -136,8 +136,8 @@ impl<'a> Surface<'a> {
         for corner in corners {
             all.push(self.point(*corner)?);
         }
-        self.triangles.extend(polygon::triangulate(&all, &self.points));
-        self.notes.polygons += 1;
+        let is_doubtful = polygon::add(&all, &self.points, &mut self.triangles);
+        self.notes.polygon(is_doubtful);
         self.scratch = all;
         Ok(())
     }
