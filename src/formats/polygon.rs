@@ -349,15 +349,16 @@ mod tests {
         }
     }
 
+    /// The looks do not suffice for wild polygons of so many corners: that is told, whether they fold or not.
     #[test]
     fn many_corners_take_a_time_in_proportion() {
         let n = 50_000;
         let shapes = [
             ("disk", false, around(n, |_| 2.0)),
-            ("star", false, around(n, |k| 2.0 + f64::from(k % 2))),
-            ("ragged", false, around(n, |k| 2.0 + f64::from(k.wrapping_mul(k) % 17))),
-            ("comb", false, comb(n)),
-            ("deep comb", false, deep_comb(n)),
+            ("star", true, around(n, |k| 2.0 + f64::from(k % 2))),
+            ("ragged", true, around(n, |k| 2.0 + f64::from(k.wrapping_mul(k) % 17))),
+            ("comb", true, comb(n)),
+            ("deep comb", true, deep_comb(n)),
             ("point", false, vec![[0.0; 3]; n as usize]),
             ("noise", true, (0..n).map(|k| [0.7123, 0.3791, 0.0].map(|s| (f64::from(k) * s).fract())).collect()),
         ];
@@ -367,6 +368,7 @@ mod tests {
             let mut triangles = Vec::new();
             let is_doubtful = add(&corners, &points, &mut triangles);
             assert_eq!((triangles.len(), is_doubtful), (n as usize - 2, doubtful), "{shape}");
+            assert!(is_doubtful || areas(&triangles, &points).iter().all(|a| *a >= 0.0), "{shape}");
             assert!(start.elapsed().as_secs() < 30, "{shape}: {:?}", start.elapsed());
         }
     }
