@@ -10,7 +10,8 @@ use crate::formats::{Limits, Nothing, Source};
 use pipeline::distortion::CellFields;
 
 /// How every file of planish's begins; compressors came and went.
-const HEAD: &str = "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"";
+const HEAD: &str =
+    "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"";
 
 /// The fields that `planish check` looks at.
 const FIELDS: [Field; 9] = [
