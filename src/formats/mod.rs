@@ -197,8 +197,8 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
         return Err(ReadError::Empty);
     }
     match sniff::sniff(bytes).unwrap_or(format) {
-        Format::Stl => stl::read(bytes),
-        Format::Obj => obj::read(bytes),
+        Format::Stl => stl::read(source),
+        Format::Obj => obj::read(source),
         Format::Gltf => gltf::read(source),
         Format::Vtk | Format::Vtu | Format::Vtp => vtk::read(source),
         Format::Ply => ply::read(source),

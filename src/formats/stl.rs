@@ -5,7 +5,7 @@
 //! after any blanks, and text follows. ASCII files may hold several solids; all of them are read. Words count, not
 //! lines: a facet may stand on one line.
 
-use super::{Content, Notes, ReadError};
+use super::{Content, Notes, ReadError, Source};
 use crate::outcome::Code;
 use pipeline::mesh::TriangleSoup;
 
@@ -52,6 +52,16 @@ pub enum StlError {
         /// Whole triangles that fit.
         room: usize,
     },
+    /// There are more triangles than may be.
+    #[error(
+        "{count} triangles exceed the limit of {limit}; split the file, or raise `elements` in the table [limits] of planish.toml"
+    )]
+    TooMany {
+        /// How many there are, so far at least.
+        count: u64,
+        /// How many may be.
+        limit: u64,
+    },
     /// A coordinate of a binary file is not a number, or infinite.
     #[error("triangle {triangle} has the coordinate {value}; repair the exporting model")]
     BinaryNotFinite {
@@ -90,6 +100,7 @@ impl StlError {
     pub(super) fn code(&self) -> Code {
         match self {
             Self::Count { .. } | Self::Excess { .. } => Code::CountMismatch,
+            Self::TooMany { .. } => Code::TooLarge,
             Self::BinaryNotFinite { .. } | Self::AsciiNotFinite { .. } => Code::NotFinite,
             Self::Short { .. } | Self::Syntax { .. } | Self::Truncated { .. } => Code::Malformed,
         }
@@ -99,6 +110,7 @@ impl StlError {
         Some(match self {
             Self::Short { size } => format!("byte {size}"),
             Self::Count { .. } | Self::Excess { .. } => "byte 80".to_owned(),
+            Self::TooMany { .. } => return None,
             Self::BinaryNotFinite { byte, .. } => format!("byte {byte}"),
             Self::AsciiNotFinite { line, .. } | Self::Syntax { line, .. } | Self::Truncated { line } => {
                 format!("line {line}")
@@ -107,20 +119,26 @@ impl StlError {
     }
 }
 
-/// Reads an STL file.
-pub(super) fn read(bytes: &[u8]) -> Result<Content, ReadError> {
+/// Reads an STL file. The limit of elements holds for its triangles: it has no other points than their corners.
+pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
+    let (bytes, limit) = (source.bytes, source.limits.elements);
     let declared = declared(bytes);
     let size_fits = declared.is_some_and(|n| needed(n) == bytes.len() as u64);
     let mut notes = Notes::new(if size_fits { "STL, binary" } else { "STL, ASCII" });
     let points = if size_fits {
+        few_enough(declared.unwrap_or(0).into(), limit)?;
         binary(&bytes[HEADER..])?
     } else if begins_with_solid(bytes) {
-        ascii(bytes, &mut notes)?
+        ascii(bytes, limit, &mut notes)?
     } else {
         return Err(mismatch(declared, bytes.len()).into());
     };
     let triangles = (0..points.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     Ok(Content { soup: TriangleSoup::new(points, triangles)?, notes })
+}
+
+fn few_enough(count: u64, limit: u64) -> Result<(), StlError> {
+    if count <= limit { Ok(()) } else { Err(StlError::TooMany { count, limit }) }
 }
 
 fn declared(bytes: &[u8]) -> Option<u32> {
@@ -226,7 +244,7 @@ fn is(word: &[u8], keyword: &str) -> bool {
 }
 
 /// The corners of all triangles of all solids.
-fn ascii(bytes: &[u8], notes: &mut Notes) -> Result<Vec<[f64; 3]>, StlError> {
+fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Vec<[f64; 3]>, StlError> {
     let mut points: Vec<[f64; 3]> = Vec::new();
     let mut words = Words::new(text(bytes));
     words.line += bytes[..bytes.len() - text(bytes).len()].iter().filter(|b| **b == b'\n').count();
@@ -247,7 +265,10 @@ fn ascii(bytes: &[u8], notes: &mut Notes) -> Result<Vec<[f64; 3]>, StlError> {
                 in_solid = false;
                 words.name();
             }
-            (b"facet", None) if in_solid => corners = Some(0),
+            (b"facet", None) if in_solid => {
+                few_enough(points.len() as u64 / 3 + 1, limit)?;
+                corners = Some(0);
+            }
             (b"vertex", Some(n)) if n < 3 => {
                 points.push(vertex(&mut words)?);
                 corners = Some(n + 1);
@@ -304,8 +325,14 @@ fn shown(word: &[u8]) -> String {
 mod tests {
     use super::*;
 
+    use crate::formats::{Limits, Nothing};
+
     fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
-        super::read(bytes).map(|content| content.soup)
+        limited(bytes, &Limits::default())
+    }
+
+    fn limited(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, ReadError> {
+        super::read(&Source { bytes, limits, beside: &Nothing }).map(|content| content.soup)
     }
 
     fn facet(x: &str) -> String {
@@ -373,6 +400,20 @@ mod tests {
         let named = binary_file(b"solid part", 3, &[TRIANGLE; 2]);
         assert!(matches!(error(&named), StlError::Count { .. }), "binary, though it begins with solid");
         assert_eq!(error(b"abc"), StlError::Short { size: 3 });
+    }
+
+    #[test]
+    fn too_many_triangles_are_refused_by_the_name_of_the_setting() {
+        let limits = Limits { elements: 2, ..Limits::default() };
+        let text = |facets: usize| format!("solid\n{}endsolid", facet("0").repeat(facets)).into_bytes();
+        for (fits, more) in
+            [(binary_file(b"", 2, &[TRIANGLE; 2]), binary_file(b"", 3, &[TRIANGLE; 3])), (text(2), text(3))]
+        {
+            assert!(limited(&fits, &limits).is_ok());
+            let reason = limited(&more, &limits).expect_err("three triangles").reason();
+            assert!(reason.code == Code::TooLarge && reason.message.contains("3 triangles"), "{reason:?}");
+            assert!(reason.message.contains("`elements` in the table [limits] of planish.toml"), "{reason:?}");
+        }
     }
 
     #[test]

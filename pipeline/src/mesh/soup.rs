@@ -66,17 +66,13 @@ impl TriangleSoup {
         if triangles.len() > limit || count > 3 * limit {
             return Err(SoupError::TooLarge { triangles: triangles.len(), points: count, limit });
         }
-        for (point, p) in points.iter().enumerate() {
-            for (axis, value) in ['x', 'y', 'z'].into_iter().zip(*p) {
-                if value.is_nan() || value.abs() > LARGEST {
-                    return Err(SoupError::NotFinite { point, axis, value });
-                }
-            }
+        if let Some(point) = points.iter().position(|p| !p.iter().fold(true, |sound, c| sound & is_sound(*c))) {
+            return Err(not_finite(point, points[point]));
         }
-        for (triangle, t) in triangles.iter().enumerate() {
-            if let Some(&index) = t.iter().find(|&&i| i as usize >= count) {
-                return Err(SoupError::IndexOutOfRange { triangle, index, points: count });
-            }
+        // One number is compared per triangle: the largest.
+        if let Some(triangle) = triangles.iter().position(|[a, b, c]| *a.max(b).max(c) as usize >= count) {
+            let index = triangles[triangle].into_iter().find(|i| *i as usize >= count).unwrap_or_default();
+            return Err(SoupError::IndexOutOfRange { triangle, index, points: count });
         }
         if triangles.is_empty() {
             return Err(SoupError::NoTriangles { points: count });
@@ -93,6 +89,17 @@ impl TriangleSoup {
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
+}
+
+/// Whether a coordinate is a number that is not too large.
+fn is_sound(c: f64) -> bool {
+    c.abs() <= LARGEST
+}
+
+/// What is wrong with a point.
+fn not_finite(point: usize, p: Vec3) -> SoupError {
+    let at = p.iter().position(|c| !is_sound(*c)).unwrap_or_default();
+    SoupError::NotFinite { point, axis: ['x', 'y', 'z'][at], value: p[at] }
 }
 
 #[cfg(test)]

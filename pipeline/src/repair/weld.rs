@@ -5,15 +5,16 @@ use crate::id::VertexId;
 use crate::mesh::TriangleSoup;
 use crate::space::Vec3;
 
+/// Places of the table that are looked at per point, on average and at most.
+const LOOKS: usize = 8;
+
+/// In tables: no point.
+const NONE: u32 = u32::MAX;
+
 /// Merges points with equal coordinates (0 and -0 are equal); returns the draft and how many points were merged
 /// away. Vertices are numbered in the order of their first appearance among the points.
 pub(super) fn weld(soup: &TriangleSoup) -> (Draft, usize) {
-    let mut order: Vec<([u64; 3], u32)> = soup.points().iter().map(|p| bits(*p)).zip(0..).collect();
-    order.sort_unstable();
-    let mut first = vec![0_u32; order.len()];
-    for equal in order.chunk_by(|a, b| a.0 == b.0) {
-        equal.iter().for_each(|e| first[e.1 as usize] = equal[0].1);
-    }
+    let first = first_by_table(soup.points()).unwrap_or_else(|| first_by_order(soup.points()));
     let mut number = vec![VertexId(0); first.len()];
     let mut points = Vec::new();
     for (i, &f) in first.iter().enumerate() {
@@ -30,7 +31,78 @@ pub(super) fn weld(soup: &TriangleSoup) -> (Draft, usize) {
     (Draft { points, triangles, source }, merged)
 }
 
+/// For each point the first one that is equal, by a table in which a point lies at the first free place from that of its
+/// coordinates on (Knuth, The Art of Computer Programming 3, 6.4, algorithm L). None where that takes too many looks,
+/// as points may be chosen so that it does.
+fn first_by_table(points: &[Vec3]) -> Option<Vec<u32>> {
+    // At most half of the places are taken.
+    let places = (2 * points.len()).max(2).next_power_of_two();
+    let mut table = vec![NONE; places];
+    let mut looks = LOOKS * points.len();
+    let mut first = Vec::with_capacity(points.len());
+    for (i, point) in points.iter().enumerate() {
+        let point = bits_of(*point);
+        let mut place = (scattered(point) >> (u64::BITS - places.ilog2())) as usize;
+        loop {
+            let found = &mut table[place];
+            if *found == NONE {
+                *found = i as u32;
+            }
+            if *found as usize == i || bits_of(points[*found as usize]) == point {
+                first.push(*found);
+                break;
+            }
+            looks = looks.checked_sub(1)?;
+            place = (place + 1) % places;
+        }
+    }
+    Some(first)
+}
+
+/// The same, by a sort.
+fn first_by_order(points: &[Vec3]) -> Vec<u32> {
+    let mut order: Vec<([u64; 3], u32)> = points.iter().map(|p| bits_of(*p)).zip(0..).collect();
+    order.sort_unstable();
+    let mut first = vec![0_u32; order.len()];
+    for equal in order.chunk_by(|a, b| a.0 == b.0) {
+        equal.iter().for_each(|e| first[e.1 as usize] = equal[0].1);
+    }
+    first
+}
+
 /// The bits of a point, with negative zero turned into zero.
-fn bits(p: Vec3) -> [u64; 3] {
+fn bits_of(p: Vec3) -> [u64; 3] {
     p.map(|c| (c + 0.0).to_bits())
+}
+
+/// A number that differs in its high bits for points that do not.
+fn scattered(bits: [u64; 3]) -> u64 {
+    bits.into_iter().fold(0, |scattered: u64, bits| {
+        let product = (scattered ^ bits).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        product ^ product >> 32
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_ways_find_the_same() {
+        let grid = |k: u32, side: u32| [f64::from(k % side), f64::from(k / side % 7), -f64::from(k % 2)];
+        for (count, side) in [(0, 1), (1, 1), (2, 1), (1000, 10), (1000, 1000), (4096, 3)] {
+            let points: Vec<Vec3> = (0..count).map(|k| grid(k, side)).collect();
+            let by_order = first_by_order(&points);
+            assert_eq!(first_by_table(&points), Some(by_order), "{count} points");
+        }
+        assert_eq!(first_by_table(&[[0.0, 1.0, 2.0], [-0.0, 1.0, 2.0]]), Some(vec![0, 0]));
+    }
+
+    #[test]
+    fn points_that_crowd_in_the_table_are_sorted() {
+        let crowd = (0..).map(|k| [f64::from(k), 0.0, 0.0]).filter(|p| scattered(bits_of(*p)) >> 52 == 0);
+        let points: Vec<Vec3> = crowd.take(300).collect();
+        assert_eq!(first_by_table(&points), None);
+        assert_eq!(first_by_order(&points), (0..300).collect::<Vec<u32>>());
+    }
 }

@@ -37,8 +37,23 @@ impl<'a> Layout<'a> {
         }
     }
 
+    /// The elements, each with what follows up to the next one; the last one with less, perhaps.
     fn elements(&self) -> impl Iterator<Item = &'a [u8]> {
-        (0..self.count).map(|i| &self.bytes[i * self.stride..])
+        self.bytes.chunks(self.stride).take(self.count)
+    }
+
+    /// Vectors of coordinates that are told as `decode` knows.
+    fn vectors<const N: usize>(&self, decode: impl Fn([u8; N]) -> f64) -> Vec<[f64; 3]> {
+        let vector = |bytes: &[u8]| {
+            let parts = bytes.as_chunks().0;
+            [parts[0], parts[1], parts[2]].map(&decode)
+        };
+        self.elements().map(vector).collect()
+    }
+
+    /// Indices of so many bytes.
+    fn indices<const N: usize>(&self, decode: impl Fn([u8; N]) -> u32) -> Vec<u32> {
+        self.elements().map(|bytes| decode(bytes.as_chunks().0[0])).collect()
     }
 }
 
@@ -51,11 +66,9 @@ impl Accessors<'_> {
         if accessor.type_ != Checked::Valid(Type::Vec3) {
             return Err(fail("positions must be VEC3".to_owned()));
         }
-        let decode = decoder(kind, accessor.normalized).ok_or_else(|| fail("positions cannot be U32".to_owned()))?;
-        let vector = |bytes: &[u8]| [0, 1, 2].map(|k| decode(&bytes[k * kind.size()..]));
         let read = |view: Index<buffer::View>, offset: u64, count: usize| {
             let layout = Layout::new(self.buffers.view(view)?, offset, count, 3 * kind.size()).map_err(fail)?;
-            Ok::<_, GltfError>(layout.elements().map(vector).collect::<Vec<[f64; 3]>>())
+            vectors(&layout, kind, accessor.normalized).ok_or_else(|| fail("positions cannot be U32".to_owned()))
         };
         let mut vectors = match accessor.buffer_view {
             Some(view) => read(view, accessor.byte_offset.map_or(0, |o| o.0), count)?,
@@ -74,15 +87,15 @@ impl Accessors<'_> {
     pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, GltfError> {
         let (accessor, count) = self.get(index)?;
         let fail = |problem: String| broken(place(index), problem);
-        let kind = component(&accessor.component_type).and_then(|kind| index_decoder(kind).map(|d| (kind.size(), d)));
-        let (size, decode) = kind.ok_or_else(|| fail("indices must be U8, U16 or U32".to_owned()))?;
+        let kind = component(&accessor.component_type).filter(|kind| is_index(*kind));
+        let kind = kind.ok_or_else(|| fail("indices must be U8, U16 or U32".to_owned()))?;
         if accessor.type_ != Checked::Valid(Type::Scalar) || accessor.sparse.is_some() {
             return Err(fail("indices must be plain scalars".to_owned()));
         }
         let view = accessor.buffer_view.ok_or_else(|| self.without_data(index))?;
         let offset = accessor.byte_offset.map_or(0, |o| o.0);
-        let layout = Layout::new(self.buffers.view(view)?, offset, count, size).map_err(fail)?;
-        Ok(layout.elements().map(decode).collect())
+        let layout = Layout::new(self.buffers.view(view)?, offset, count, kind.size()).map_err(fail)?;
+        Ok(indices(&layout, kind))
     }
 
     /// An accessor and its number of elements.
@@ -108,13 +121,13 @@ impl Accessors<'_> {
         let given = usize::try_from(sparse.count.0).ok().filter(|n| *n <= count);
         let given = given.ok_or_else(|| Sparse::Broken("more sparse values than elements".to_owned()))?;
         let kind = match sparse.indices.component_type {
-            Checked::Valid(kind) => index_decoder(kind.0).map(|d| (kind.0.size(), d)),
+            Checked::Valid(kind) => Some(kind.0).filter(|kind| is_index(*kind)),
             Checked::Invalid => None,
         };
-        let (size, decode) = kind.ok_or_else(|| Sparse::Broken("an unknown type of sparse indices".to_owned()))?;
+        let kind = kind.ok_or_else(|| Sparse::Broken("an unknown type of sparse indices".to_owned()))?;
         let view = self.buffers.view(sparse.indices.buffer_view).map_err(Sparse::View)?;
-        let layout = Layout::new(view, sparse.indices.byte_offset.0, given, size).map_err(Sparse::Broken)?;
-        let places: Vec<usize> = layout.elements().map(|b| decode(b) as usize).collect();
+        let layout = Layout::new(view, sparse.indices.byte_offset.0, given, kind.size()).map_err(Sparse::Broken)?;
+        let places: Vec<usize> = indices(&layout, kind).into_iter().map(|place| place as usize).collect();
         match places.iter().find(|p| **p >= count) {
             Some(place) => Err(Sparse::Broken(format!("sparse value {place} of {count}"))),
             None => Ok(places),
@@ -145,29 +158,32 @@ fn component(kind: &Checked<gltf::json::accessor::GenericComponentType>) -> Opti
     if let Checked::Valid(kind) = kind { Some(kind.0) } else { None }
 }
 
-type Decode<T> = fn(&[u8]) -> T;
-
-/// How a coordinate is told. Small integers that are normalised stand for numbers up to one (glTF 2.0, 3.11).
-fn decoder(kind: ComponentType, normalized: bool) -> Option<Decode<f64>> {
+/// Vectors of coordinates of this type, if it is one of coordinates. Small integers that are normalised stand for
+/// numbers up to one (glTF 2.0, 3.11).
+fn vectors(layout: &Layout, kind: ComponentType, normalized: bool) -> Option<Vec<[f64; 3]>> {
     Some(match (kind, normalized) {
-        (ComponentType::F32, _) => |b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-        (ComponentType::I8, false) => |b| f64::from(b[0] as i8),
-        (ComponentType::U8, false) => |b| f64::from(b[0]),
-        (ComponentType::I16, false) => |b| f64::from(i16::from_le_bytes([b[0], b[1]])),
-        (ComponentType::U16, false) => |b| f64::from(u16::from_le_bytes([b[0], b[1]])),
-        (ComponentType::I8, true) => |b| (f64::from(b[0] as i8) / 127.0).max(-1.0),
-        (ComponentType::U8, true) => |b| f64::from(b[0]) / 255.0,
-        (ComponentType::I16, true) => |b| (f64::from(i16::from_le_bytes([b[0], b[1]])) / 32767.0).max(-1.0),
-        (ComponentType::U16, true) => |b| f64::from(u16::from_le_bytes([b[0], b[1]])) / 65535.0,
+        (ComponentType::F32, _) => layout.vectors(|b| f64::from(f32::from_le_bytes(b))),
+        (ComponentType::I8, false) => layout.vectors(|b| f64::from(i8::from_le_bytes(b))),
+        (ComponentType::U8, false) => layout.vectors(|[b]| f64::from(b)),
+        (ComponentType::I16, false) => layout.vectors(|b| f64::from(i16::from_le_bytes(b))),
+        (ComponentType::U16, false) => layout.vectors(|b| f64::from(u16::from_le_bytes(b))),
+        (ComponentType::I8, true) => layout.vectors(|b| (f64::from(i8::from_le_bytes(b)) / 127.0).max(-1.0)),
+        (ComponentType::U8, true) => layout.vectors(|[b]| f64::from(b) / 255.0),
+        (ComponentType::I16, true) => layout.vectors(|b| (f64::from(i16::from_le_bytes(b)) / 32767.0).max(-1.0)),
+        (ComponentType::U16, true) => layout.vectors(|b| f64::from(u16::from_le_bytes(b)) / 65535.0),
         (ComponentType::U32, _) => return None,
     })
 }
 
-fn index_decoder(kind: ComponentType) -> Option<Decode<u32>> {
-    Some(match kind {
-        ComponentType::U8 => |b| u32::from(b[0]),
-        ComponentType::U16 => |b| u32::from(u16::from_le_bytes([b[0], b[1]])),
-        ComponentType::U32 => |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]),
-        ComponentType::I8 | ComponentType::I16 | ComponentType::F32 => return None,
-    })
+fn is_index(kind: ComponentType) -> bool {
+    matches!(kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
+}
+
+/// Indices of this type, which is one of indices.
+fn indices(layout: &Layout, kind: ComponentType) -> Vec<u32> {
+    match kind {
+        ComponentType::U8 => layout.indices(|[b]| u32::from(b)),
+        ComponentType::U16 => layout.indices(|b| u32::from(u16::from_le_bytes(b))),
+        _ => layout.indices(u32::from_le_bytes),
+    }
 }

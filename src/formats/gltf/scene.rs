@@ -116,7 +116,8 @@ impl Walk<'_> {
             Some(indices) => self.accessors.indices(indices)?,
             None => (0..points.len() as u32).collect(),
         };
-        if let Some(corner) = corners.iter().find(|c| **c as usize >= points.len()) {
+        if corners.iter().copied().max().is_some_and(|largest| largest as usize >= points.len()) {
+            let corner = corners.iter().find(|c| **c as usize >= points.len()).copied().unwrap_or_default();
             return Err(fail(&format!("index {corner}, but there are {} positions", points.len())));
         }
         let base = self.scene.points.len();
@@ -128,22 +129,22 @@ impl Walk<'_> {
         self.scene.points.extend(points.iter().map(|p| transform.of_point(*p)));
         let base = base as u32;
         let is_mirrored = transform.determinant() < 0.0;
-        self.scene.triangles.extend(triangles(mode, &corners).map(|[a, b, c]| {
+        for_triangles(mode, &corners, |[a, b, c]| {
             let [b, c] = if is_mirrored { [c, b] } else { [b, c] };
-            [a, b, c].map(|v| base + v)
-        }));
+            self.scene.triangles.push([a, b, c].map(|v| base + v));
+        });
         Ok(())
     }
 }
 
-/// The triangles of a list, a strip or a fan (glTF 2.0, 3.7.2.1).
-fn triangles(mode: Mode, corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
-    let count = if mode == Mode::Triangles { corners.len() / 3 } else { corners.len().saturating_sub(2) };
-    (0..count).map(move |i| match mode {
-        Mode::TriangleStrip => [corners[i], corners[i + 1 + i % 2], corners[i + 2 - i % 2]],
-        Mode::TriangleFan => [corners[i + 1], corners[i + 2], corners[0]],
-        _ => [corners[3 * i], corners[3 * i + 1], corners[3 * i + 2]],
-    })
+/// Goes through the triangles of a list, a strip or a fan (glTF 2.0, 3.7.2.1).
+fn for_triangles(mode: Mode, corners: &[u32], mut add: impl FnMut([u32; 3])) {
+    let threes = corners.windows(3).enumerate();
+    match mode {
+        Mode::TriangleStrip => threes.for_each(|(i, t)| add([t[0], t[1 + i % 2], t[2 - i % 2]])),
+        Mode::TriangleFan => threes.for_each(|(_, t)| add([t[1], t[2], corners[0]])),
+        _ => corners.as_chunks().0.iter().for_each(|t| add(*t)),
+    }
 }
 
 impl Transform {

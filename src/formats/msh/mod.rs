@@ -5,8 +5,10 @@
 //! are counted by kind. The names of physical groups are told; all other sections are passed over.
 
 mod nodes;
+mod plain;
 mod sections;
 mod shapes;
+mod sparse;
 mod surface;
 mod values;
 

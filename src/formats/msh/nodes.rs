@@ -1,6 +1,7 @@
 //! Nodes by their tags.
 
 use super::MshError;
+use super::sparse::Sparse;
 use pipeline::space::Vec3;
 
 /// A table by tag may have so many places per node.
@@ -20,8 +21,8 @@ enum Numbering {
     Run(u64),
     /// From this one on, with gaps.
     Table(u64, Vec<u32>),
-    /// Tag and position, by tag.
-    Sorted(Vec<(u64, u32)>),
+    /// Far apart.
+    Sparse(Sparse),
 }
 
 /// In tables: no node.
@@ -45,10 +46,7 @@ impl Nodes {
                 let at = usize::try_from(tag.checked_sub(*first)?).ok()?;
                 table.get(at).copied().filter(|node| *node != GAP)
             }
-            Numbering::Sorted(tags) => {
-                let at = tags.binary_search_by_key(&tag, |(tag, _)| *tag).ok()?;
-                Some(tags[at].1)
-            }
+            Numbering::Sparse(sparse) => sparse.find(tag),
         }
     }
 }
@@ -62,7 +60,7 @@ impl Numbering {
         } else if span < PLACES * tags.len() as u64 {
             Self::table(tags, first, span as usize + 1)
         } else {
-            Self::sorted(tags)
+            Sparse::new(tags).map(Self::Sparse)
         }
     }
 
@@ -77,15 +75,6 @@ impl Numbering {
         }
         Ok(Self::Table(first, table))
     }
-
-    fn sorted(tags: &[u64]) -> Result<Self, MshError> {
-        let mut sorted: Vec<(u64, u32)> = tags.iter().copied().zip(0..).collect();
-        sorted.sort_unstable();
-        match sorted.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            Some(pair) => Err(MshError::SameNode { node: pair[0].0 }),
-            None => Ok(Self::Sorted(sorted)),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -94,7 +83,15 @@ mod tests {
 
     #[test]
     fn tags_of_all_sorts_are_found() {
-        let rows: [&[u64]; 6] = [&[], &[7], &[5, 6, 7, 8], &[8, 6, 5, 7], &[10, 3, 5, 7], &[1, u64::MAX, 1 << 40, 0]];
+        let rows: [&[u64]; 7] = [
+            &[],
+            &[7],
+            &[5, 6, 7, 8],
+            &[8, 6, 5, 7],
+            &[10, 3, 5, 7],
+            &[1, u64::MAX, 1 << 40, 0],
+            &[u64::MAX - 1, 9, 1 << 40],
+        ];
         for tags in rows {
             let points = vec![[0.0; 3]; tags.len()];
             let nodes = Nodes::new(points, tags).expect("distinct tags");

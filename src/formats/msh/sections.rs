@@ -2,6 +2,7 @@
 
 use super::MshError;
 use super::nodes::Nodes;
+use super::plain::Layout;
 use super::shapes::{Kind, Shape};
 use super::surface::Surface;
 use super::values::{Fault, Values, number};
@@ -158,7 +159,9 @@ fn blocks_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64
             skip_records(values, block, 1 + tags + shape.nodes as u64, V::INT)?;
             continue;
         }
-        for _ in 0..block {
+        let layout = Layout { shape, before: tags.saturating_add(1), size: V::INT };
+        let plain = values.binary().map_or(0, |binary| surface.plain(binary, layout, block));
+        for _ in plain..block {
             let element = values.natural()?;
             values.skip(tags, V::INT)?;
             surface.element(values, shape, element, V::natural)?;
@@ -185,7 +188,9 @@ pub fn elements_4<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> R
             skip_records(values, block, 1 + shape.nodes as u64, V::SIZE)?;
             continue;
         }
-        for _ in 0..block {
+        let layout = Layout { shape, before: 1, size: V::SIZE };
+        let plain = values.binary().map_or(0, |binary| surface.plain(binary, layout, block));
+        for _ in plain..block {
             let element = values.size()?;
             surface.element(values, shape, element, V::size)?;
         }

@@ -9,16 +9,12 @@ use crate::formats::{Limits, Notes, polygon};
 use pipeline::mesh::{SoupError, TriangleSoup};
 use std::collections::BTreeMap;
 
-/// What a node is in the elements.
-const CORNER: u8 = 1;
-const MID: u8 = 2;
-
 /// Nodes, and the triangles so far.
 pub struct Surface<'n> {
-    nodes: Nodes,
-    /// What each node is.
-    role: Vec<u8>,
-    triangles: Vec<[u32; 3]>,
+    pub(super) nodes: Nodes,
+    /// The nodes that lie in the middle of edges and faces; none where all elements have their corners only.
+    mids: Vec<bool>,
+    pub(super) triangles: Vec<[u32; 3]>,
     /// Elements that are no part of a surface.
     skipped: BTreeMap<&'static str, u64>,
     /// Quadrangles, and how many of them are doubtful.
@@ -31,9 +27,8 @@ pub struct Surface<'n> {
 impl<'n> Surface<'n> {
     /// No triangles.
     pub fn new(nodes: Nodes, limits: &'n Limits) -> Self {
-        let role = vec![0; nodes.points.len()];
-        let (triangles, skipped, at_hand) = (Vec::new(), BTreeMap::new(), Vec::new());
-        Self { nodes, role, triangles, skipped, polygons: [0; 2], at_hand, limits }
+        let (mids, triangles, skipped, at_hand) = (Vec::new(), Vec::new(), BTreeMap::new(), Vec::new());
+        Self { nodes, mids, triangles, skipped, polygons: [0; 2], at_hand, limits }
     }
 
     /// Counts elements that are no part of a surface.
@@ -61,39 +56,57 @@ impl<'n> Surface<'n> {
     fn add(&mut self, shape: Shape, element: u64, place: Place) -> Result<(), MshError> {
         let mut corners = [0; 4];
         let count = if shape.kind == Kind::Quad { 4 } else { 3 };
-        for (i, node) in self.at_hand.iter().copied().enumerate() {
+        for i in 0..self.at_hand.len() {
+            let node = self.at_hand[i];
             let found = self.nodes.find(node).ok_or(MshError::NoNode { element, node, place })?;
-            self.role[found as usize] |= if i < count { CORNER } else { MID };
             if i < count {
                 corners[i] = found;
+            } else {
+                self.mark(found);
             }
         }
-        let is_doubtful = polygon::add(&corners[..count], &self.nodes.points, &mut self.triangles);
-        self.polygons[0] += usize::from(count > 3);
-        self.polygons[1] += usize::from(is_doubtful);
+        self.face(&corners[..count]);
         let (count, limit) = (self.triangles.len() as u64, self.limits.elements);
         if count > limit { Err(MshError::TooMany { what: "triangles", count, limit }) } else { Ok(()) }
     }
 
+    /// Marks a node as one in the middle of an edge or face.
+    pub(super) fn mark(&mut self, node: u32) {
+        if self.mids.is_empty() {
+            self.mids = vec![false; self.nodes.points.len()];
+        }
+        self.mids[node as usize] = true;
+    }
+
+    /// Adds a face with these corners.
+    #[inline]
+    pub(super) fn face(&mut self, corners: &[u32]) {
+        let is_doubtful = polygon::add(corners, &self.nodes.points, &mut self.triangles);
+        self.polygons[0] += usize::from(corners.len() > 3);
+        self.polygons[1] += usize::from(is_doubtful);
+    }
+
     /// All triangles, and the nodes without those that lie in the middle of edges and faces only.
     pub fn finish(self, notes: &mut Notes) -> Result<TriangleSoup, SoupError> {
-        let Self { nodes, role, mut triangles, .. } = self;
+        let Self { nodes, mut mids, mut triangles, .. } = self;
         for (kind, count) in self.skipped {
             notes.skip(kind, usize::try_from(count).unwrap_or(usize::MAX));
         }
         [notes.polygons, notes.polygons_doubtful] = self.polygons;
-        notes.mid_nodes = role.iter().filter(|r| **r == MID).count();
         let mut points = nodes.points;
-        if notes.mid_nodes > 0 {
+        if !mids.is_empty() {
+            // What is a corner anywhere stays.
+            triangles.iter().flatten().for_each(|corner| mids[*corner as usize] = false);
+            notes.mid_nodes = mids.iter().filter(|mid| **mid).count();
             let mut kept = 0;
-            let number = |r: &u8| {
-                kept += u32::from(*r != MID);
+            let number = |mid: &bool| {
+                kept += u32::from(!*mid);
                 // That of nodes in the middle is never asked for.
                 kept.saturating_sub(1)
             };
-            let numbers: Vec<u32> = role.iter().map(number).collect();
-            let mut roles = role.iter();
-            points.retain(|_| roles.next() != Some(&MID));
+            let numbers: Vec<u32> = mids.iter().map(number).collect();
+            let mut left_out = mids.iter();
+            points.retain(|_| left_out.next() != Some(&true));
             triangles.iter_mut().for_each(|t| *t = t.map(|node| numbers[node as usize]));
         }
         TriangleSoup::new(points, triangles)

@@ -62,6 +62,11 @@ pub trait Values<'a>: Clone {
     /// Passes over so many values of so many bytes.
     fn skip(&mut self, count: u64, bytes: u64) -> Result<(), Fault>;
 
+    /// The same, if it is binary, for what can be done at once then.
+    fn binary(&mut self) -> Option<&mut Binary<'a>> {
+        None
+    }
+
     /// An int that is not negative.
     fn natural(&mut self) -> Result<u64, Fault> {
         let int = self.int()?;
@@ -221,6 +226,10 @@ impl<'a> Values<'a> for Binary<'a> {
     #[inline]
     fn double(&mut self) -> Result<f64, Fault> {
         self.array().map(f64::from_le_bytes)
+    }
+
+    fn binary(&mut self) -> Option<&mut Binary<'a>> {
+        Some(self)
     }
 
     fn skip(&mut self, count: u64, bytes: u64) -> Result<(), Fault> {

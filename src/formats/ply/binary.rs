@@ -41,36 +41,43 @@ impl<'a> Binary<'a> {
         Some(Table { bytes, stride, begin, big: self.big })
     }
 
-    /// Adds the triangles of as many faces as are plain: whose list has three indices in range. Gives how many.
-    pub fn triangles(&mut self, plain: Plain, most: u64, triangles: &mut Vec<[u32; 3]>) -> u64 {
-        let before = triangles.len();
-        let most = usize::try_from(most).unwrap_or(usize::MAX);
-        let records = self.rest.chunks_exact(plain.before + LIST + plain.after).take(most);
-        let (big, bytes) = (self.big, |record: &[u8], at: usize| -> [u8; 4] {
-            [record[at], record[at + 1], record[at + 2], record[at + 3]]
-        });
-        for record in records {
-            let list = &record[plain.before..plain.before + LIST];
-            let triangle = [1, 5, 9].map(|at| u32::from_le_bytes(ordered(bytes(list, at), big)));
-            if list[0] != 3 || triangle.iter().any(|i| *i >= plain.points) {
-                break;
-            }
-            triangles.push(triangle);
+    /// Gives the corners of as many faces as are plain, of at most so many; how many they are.
+    pub fn faces(&mut self, plain: Plain, most: u64, give: impl FnMut(&[u32])) -> u64 {
+        match plain.count {
+            1 => self.lists::<1>(plain, most, give),
+            _ => self.lists::<4>(plain, most, give),
         }
-        let found = triangles.len() - before;
-        self.rest = &self.rest[found * (plain.before + LIST + plain.after)..];
-        found as u64
+    }
+
+    /// The same, for lists after a number of `N` bytes.
+    fn lists<const N: usize>(&mut self, plain: Plain, most: u64, mut give: impl FnMut(&[u32])) -> u64 {
+        let mut found = 0;
+        while found < most {
+            let Some(list) = self.rest.get(plain.before..) else { break };
+            let Some((count, list)) = list.split_first_chunk::<N>() else { break };
+            // The other bytes of a small number are zero.
+            let count = ordered(*count, self.big);
+            let rest = match (count[0], count[1..].iter().all(|b| *b == 0)) {
+                (3, true) => plain.corners::<3>(list, self.big, &mut give),
+                (4, true) => plain.corners::<4>(list, self.big, &mut give),
+                _ => None,
+            };
+            let Some(rest) = rest else { break };
+            self.rest = rest;
+            found += 1;
+        }
+        found
     }
 }
 
-/// Bytes of a list of three indices.
-const LIST: usize = 13;
-
-/// Faces with one list of 32-bit indices after a number of one byte, and nothing else of unknown size.
+/// Faces with one list of 32-bit indices after a number of one byte or four, and nothing else of unknown size. They are
+/// plain if they have three or four corners, all in range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plain {
     before: usize,
     after: usize,
+    /// Bytes of the number.
+    count: usize,
     /// Points that there are: indices are below.
     points: u32,
 }
@@ -79,13 +86,29 @@ impl Plain {
     /// Whether the faces of an element can be plain, with their list in a property.
     pub fn new(element: &Element, list: usize, points: usize) -> Option<Self> {
         let property = &element.properties[list];
-        let lists = [(Some(Scalar::U8), Scalar::I32), (Some(Scalar::U8), Scalar::U32)];
         let size =
             |of: &[Property]| -> Option<usize> { of.iter().map(|p| p.count.is_none().then(|| p.scalar.size())).sum() };
         let (before, after) = (size(&element.properties[..list])?, size(&element.properties[list + 1..])?);
         // Indices below 2^31 are the same in both types.
         let points = u32::try_from(points.min(i32::MAX as usize)).ok()?;
-        lists.contains(&(property.count, property.scalar)).then_some(Self { before, after, points })
+        let count = property.count.map(Scalar::size).filter(|size| [1, 4].contains(size))?;
+        [Scalar::I32, Scalar::U32].contains(&property.scalar).then_some(Self { before, after, count, points })
+    }
+
+    /// Gives the corners at the front of a list, if they are in range and the record is whole: what follows it.
+    #[inline]
+    fn corners<'a, const C: usize>(self, list: &'a [u8], big: bool, give: &mut impl FnMut(&[u32])) -> Option<&'a [u8]> {
+        let (bytes, rest) = list.split_at_checked(4 * C)?;
+        let rest = rest.get(self.after..)?;
+        let mut corners = [0; C];
+        for (corner, bytes) in corners.iter_mut().zip(bytes.as_chunks().0) {
+            *corner = u32::from_le_bytes(ordered(*bytes, big));
+        }
+        if corners.iter().any(|corner| *corner >= self.points) {
+            return None;
+        }
+        give(&corners);
+        Some(rest)
     }
 }
 

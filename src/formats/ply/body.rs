@@ -94,7 +94,9 @@ impl<'h> Body<'h> {
         let mut number = 0;
         while number < element.count {
             if let Some((binary, plain)) = values.binary().zip(plain) {
-                number += binary.triangles(plain, element.count - number, &mut self.triangles);
+                // Each gives two triangles at most.
+                let room = self.limits.elements.saturating_sub(self.triangles.len() as u64) / 2;
+                number += binary.faces(plain, room.min(element.count - number), |corners| self.face(corners));
                 if number == element.count {
                     break;
                 }
@@ -148,6 +150,7 @@ impl<'h> Body<'h> {
             .ok_or_else(|| Bad::Value(format!("vertex {index} is named, but there are {points} (counted from 0)")))
     }
 
+    #[inline]
     fn face(&mut self, corners: &[u32]) {
         match corners {
             [] | [_] | [_, _] => self.notes.skip("face with fewer than three corners", 1),

@@ -26,6 +26,11 @@ pub(super) fn add(corners: &[u32], points: &[Vec3], triangles: &mut Vec<[u32; 3]
             triangles.push([*a, *b, *c]);
             false
         }
+        // Most polygons are of this sort: it is worth a path of its own.
+        [a, b, c, d] if is_convex([a, b, c, d].map(|i| points[*i as usize])) => {
+            triangles.extend([[*d, *a, *b], [*d, *b, *c]]);
+            false
+        }
         [others @ .., last] => {
             let normal = normal(corners, points);
             if is_seen_from_last(corners, points, normal) {
@@ -38,6 +43,17 @@ pub(super) fn add(corners: &[u32], points: &[Vec3], triangles: &mut Vec<[u32; 3]
             }
         }
     }
+}
+
+/// Whether a quadrilateral is seen from its last corner: [`is_seen_from_last`], with the same sums in the same order.
+#[inline]
+fn is_convex([a, b, c, d]: [Vec3; 4]) -> bool {
+    let [ab, ac, ad] = [b, c, d].map(|p| sub(p, a));
+    let areas = [cross(ab, ac), cross(ac, ad)];
+    let normal = [0, 1, 2].map(|k| areas[0][k] + areas[1][k]);
+    let [da, db, dc] = [a, b, c].map(|p| sub(p, d));
+    let turn = |p: Vec3, q: Vec3| dot(cross(p, q), normal);
+    turn(da, db) > 0.0 && turn(db, dc) > 0.0 && turn(da, dc) > 0.0
 }
 
 /// Twice the vector area (Newell).

@@ -41,6 +41,22 @@ fn degenerate_polygons_still_give_their_triangles() {
 }
 
 #[test]
+fn quadrilaterals_are_judged_as_all_polygons_are() {
+    let number = |k: u32| (f64::from(k) * 0.618_033_988_749).fract() * 4.0 - 2.0;
+    let place = |k: u32| [0, 1, 2].map(|axis| number(3 * k + axis).round() / f64::from(1 + k % 3));
+    let mut convex = 0;
+    for quad in 0..5000 {
+        let points = [0, 1, 2, 3].map(|k| place(4 * quad + k));
+        let corners = [0, 1, 2, 3];
+        let seen = is_seen_from_last(&corners, &points, normal(&corners, &points));
+        assert_eq!(is_convex(points), seen, "{points:?}");
+        convex += usize::from(seen);
+    }
+    assert!((500..4500).contains(&convex), "{convex} are convex");
+    assert!(!is_convex([[f64::NAN; 3]; 4]) && !is_convex([[0.0; 3]; 4]));
+}
+
+#[test]
 fn a_star_that_winds_twice_is_not_fanned() {
     let corner = |k: u32| {
         let (sin, cos) = (f64::from(k) * 0.8 * std::f64::consts::PI).sin_cos();

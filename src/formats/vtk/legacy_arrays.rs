@@ -251,7 +251,12 @@ fn split(list: &[u32], cells: u64) -> Option<CornersAndEnds> {
     for _ in 0..cells {
         let (count, others) = rest.split_first()?;
         let (cell, others) = others.split_at_checked(*count as usize)?;
-        corners.extend_from_slice(cell);
+        match cell {
+            // Known lengths are copied faster.
+            [a, b, c] => corners.extend([*a, *b, *c]),
+            [a, b, c, d] => corners.extend([*a, *b, *c, *d]),
+            _ => corners.extend_from_slice(cell),
+        }
         ends.push(u32::try_from(corners.len()).ok()?);
         rest = others;
     }

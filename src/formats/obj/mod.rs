@@ -1,15 +1,20 @@
 //! Wavefront OBJ, read by `tobj`.
 //!
-//! Only vertices and faces matter here, so only these reach the library: lines that are continued are joined,
-//! comments, groups, materials, normals, texture coordinates, colours, points and lines are left out first. (With
+//! Only vertices and faces matter here, so only these reach the library, as it asks for them: lines that are continued
+//! are joined, comments, groups, materials, normals, texture coordinates, colours, points and lines are left out first. (With
 //! groups the library would copy vertices; it takes lines of three and more points for faces, and refuses normals
 //! and texture coordinates that nobody needs.) Polygons are cut into triangles; vertices keep the numbers they have in
 //! the file.
 
-use super::{Content, Notes, ReadError, polygon};
+mod statements;
+
+use super::place::shown;
+use super::words::{float, integer};
+use super::{Content, Limits, Notes, ReadError, Source, polygon};
 use crate::outcome::Code;
 use pipeline::mesh::TriangleSoup;
 use pipeline::space::Vec3;
+use statements::{Kind, Plain, Statement, Statements};
 
 /// Why bytes are no OBJ file.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -42,6 +47,18 @@ pub enum ObjError {
         /// The line's text, shortened.
         text: String,
     },
+    /// There are more than may be.
+    #[error(
+        "{count} {what} exceed the limit of {limit}; split the file, or raise `elements` in the table [limits] of planish.toml"
+    )]
+    TooMany {
+        /// Vertices or triangles.
+        what: &'static str,
+        /// How many there are, so far at least.
+        count: u64,
+        /// How many may be.
+        limit: u64,
+    },
     /// The library found an error that the search before it does not.
     #[error("the file cannot be read as OBJ ({problem}); export it again")]
     Library {
@@ -52,7 +69,11 @@ pub enum ObjError {
 
 impl ObjError {
     pub(super) fn code(&self) -> Code {
-        if matches!(self, Self::NotFinite { .. }) { Code::NotFinite } else { Code::Malformed }
+        match self {
+            Self::NotFinite { .. } => Code::NotFinite,
+            Self::TooMany { .. } => Code::TooLarge,
+            Self::OutOfRange { .. } | Self::Syntax { .. } | Self::Library { .. } => Code::Malformed,
+        }
     }
 
     pub(super) fn place(&self) -> Option<String> {
@@ -60,46 +81,34 @@ impl ObjError {
             Self::NotFinite { line, .. } | Self::OutOfRange { line, .. } | Self::Syntax { line, .. } => {
                 Some(format!("line {line}"))
             }
-            Self::Library { .. } => None,
+            Self::TooMany { .. } | Self::Library { .. } => None,
         }
     }
 }
 
 /// Reads an OBJ file.
-pub(super) fn read(bytes: &[u8]) -> Result<Content, ReadError> {
-    // Names and comments may be in any encoding; numbers are ASCII.
-    let text = String::from_utf8_lossy(bytes);
-    let statements = statements(&text);
-    let geometry = check(&statements)?;
-    let plain: String = statements.iter().map(|s| format!("{}\n", s.words.join(" "))).collect();
+pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
+    let statements = Statements::new(source.bytes);
+    let geometry = check(&statements, source.limits)?;
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let loaded = tobj::load_obj_buf(&mut plain.as_bytes(), &tobj::LoadOptions::default(), no_materials);
+    let loaded = tobj::load_obj_buf(&mut Plain::new(statements), &tobj::LoadOptions::default(), no_materials);
     let (models, _) = loaded.map_err(|e| ObjError::Library { problem: e.to_string() })?;
     let mut notes = Notes::new("OBJ");
-    names(&text).for_each(|name| notes.name(name));
-    let mut triangles = Vec::new();
-    for mesh in models.iter().map(|m| &m.mesh) {
+    names(source.bytes).for_each(|name| notes.name(&String::from_utf8_lossy(name)));
+    let mut triangles = Vec::with_capacity(geometry.triangles);
+    for mesh in models.into_iter().map(|m| m.mesh) {
         geometry.agrees_with(&mesh.positions)?;
-        let mut rest = &mesh.indices[..];
-        let triangles_only = mesh.face_arities.is_empty().then(|| vec![3; rest.len() / 3]);
-        for size in triangles_only.as_ref().unwrap_or(&mesh.face_arities) {
-            let (face, others) = rest.split_at((*size as usize).min(rest.len()));
-            let corners: Vec<u32> = face.iter().map(|i| geometry.first_used[*i as usize]).collect();
-            let is_doubtful = polygon::add(&corners, &geometry.points, &mut triangles);
-            if face.len() > 3 {
-                notes.polygon(is_doubtful);
-            }
-            rest = others;
-        }
+        geometry.cut(&mesh, &mut triangles, &mut notes);
     }
     Ok(Content { soup: TriangleSoup::new(geometry.points, triangles)?, notes })
 }
 
 /// The names of objects and groups.
-fn names(text: &str) -> impl Iterator<Item = &str> {
-    let lines = text.split(['\n', '\r']).map(str::trim_start);
-    lines.filter_map(|line| {
-        line.split_once([' ', '\t']).filter(|(word, _)| ["o", "g"].contains(word)).map(|(_, name)| name)
+fn names(file: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let lines = file.split(|b| [b'\n', b'\r'].contains(b)).map(<[u8]>::trim_ascii_start);
+    lines.filter_map(|line| match line {
+        [b'o' | b'g', b' ' | b'\t', name @ ..] => Some(name),
+        _ => None,
     })
 }
 
@@ -107,6 +116,8 @@ fn names(text: &str) -> impl Iterator<Item = &str> {
 struct Geometry {
     points: Vec<Vec3>,
     first_used: Vec<u32>,
+    /// How many triangles the faces give.
+    triangles: usize,
 }
 
 impl Geometry {
@@ -119,96 +130,107 @@ impl Geometry {
         }
         Err(ObjError::Library { problem: "vertices in an unexpected order".to_owned() })
     }
-}
 
-/// A vertex or face: its keyword and numbers, and its (first) line in the file, from 1.
-struct Statement<'a> {
-    words: Vec<&'a str>,
-    line: usize,
-}
-
-/// The vertices (three coordinates each) and faces (vertex indices only) of a file, in their order.
-fn statements(text: &str) -> Vec<Statement<'_>> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let separator = if text.contains('\n') { '\n' } else { '\r' };
-    let mut found = Vec::new();
-    let (mut words, mut first): (Vec<&str>, usize) = (Vec::new(), 1);
-    for (line, number) in text.split(separator).zip(1..) {
-        let line = line.split('#').next().unwrap_or_default().trim();
-        let continued = line.strip_suffix('\\');
-        words.extend(continued.unwrap_or(line).split_whitespace());
-        if continued.is_none() {
-            found.extend(geometry(std::mem::take(&mut words)).map(|words| Statement { words, line: first }));
-            first = number + 1;
-        }
-    }
-    found.extend(geometry(words).map(|words| Statement { words, line: first }));
-    found
-}
-
-/// What a statement says about vertices and faces, if anything.
-fn geometry(mut words: Vec<&str>) -> Option<Vec<&str>> {
-    match *words.first()? {
-        "v" => words.truncate(4),
-        // The old keyword "fo" means the same.
-        "f" | "fo" => {
-            words[0] = "f";
-            words[1..].iter_mut().for_each(|w| *w = w.split('/').next().unwrap_or_default());
-        }
-        _ => return None,
-    }
-    Some(words)
-}
-
-/// Finds what the library would refuse without telling the line.
-fn check(statements: &[Statement]) -> Result<Geometry, ObjError> {
-    let vertices = statements.iter().filter(|s| s.words[0] == "v").count();
-    let mut geometry = Geometry { points: Vec::with_capacity(vertices), first_used: Vec::new() };
-    let mut used = vec![false; vertices];
-    for statement in statements {
-        let line = statement.line;
-        let syntax = || ObjError::Syntax { line, text: shown(&statement.words.join(" ")) };
-        let words = statement.words.get(1..).filter(|w| w.len() >= 3).ok_or_else(syntax)?;
-        if statement.words[0] == "v" {
-            let mut point = [0.0_f64; 3];
-            for (c, word) in point.iter_mut().zip(words) {
-                *c = word.parse().map_err(|_| syntax())?;
-                if !c.is_finite() {
-                    return Err(ObjError::NotFinite { line, value: shown(word) });
-                }
+    /// Cuts the faces that the library found into triangles.
+    fn cut(&self, mesh: &tobj::Mesh, triangles: &mut Vec<[u32; 3]>, notes: &mut Notes) {
+        let mut corners = Vec::new();
+        let mut rest = &mesh.indices[..];
+        let mut sizes = mesh.face_arities.iter();
+        while !rest.is_empty() {
+            // Where all are triangles, no sizes are told.
+            let size = sizes.next().map_or(3, |size| *size as usize);
+            let (face, others) = rest.split_at(size.clamp(1, rest.len()));
+            corners.clear();
+            corners.extend(face.iter().map(|i| self.first_used[*i as usize]));
+            let is_doubtful = polygon::add(&corners, &self.points, triangles);
+            if face.len() > 3 {
+                notes.polygon(is_doubtful);
             }
-            geometry.points.push(point);
-            continue;
+            rest = others;
         }
-        for word in words {
-            let index: i64 = word.parse().map_err(|_| syntax())?;
+    }
+
+    /// Looks at the vertices of a face.
+    fn face(&mut self, statement: &Statement, used: &mut [bool]) -> Result<(), ObjError> {
+        let mut corners = 0;
+        for word in statement.numbers() {
+            let index = integer(word).ok_or_else(|| syntax(statement))?;
             // Negative indices count back from the vertices so far.
-            let limit = if index < 0 { geometry.points.len() } else { vertices };
+            let limit = if index < 0 { self.points.len() } else { used.len() };
             if index == 0 || index.unsigned_abs() > limit as u64 {
-                return Err(ObjError::OutOfRange { line, index, vertices: limit });
+                return Err(ObjError::OutOfRange { line: statement.line, index, vertices: limit });
             }
             let back = index.unsigned_abs() as usize;
             let vertex = if index < 0 { limit - back } else { back - 1 };
             if !std::mem::replace(&mut used[vertex], true) {
-                geometry.first_used.push(vertex as u32);
+                self.first_used.push(vertex as u32);
+            }
+            corners += 1;
+        }
+        if corners < 3 {
+            return Err(syntax(statement));
+        }
+        self.triangles += corners - 2;
+        Ok(())
+    }
+}
+
+/// Finds what the library would refuse without telling the line, and what is too much.
+fn check(statements: &Statements, limits: &Limits) -> Result<Geometry, ObjError> {
+    let vertices = statements.clone().filter(|s| s.kind == Kind::Vertex).count();
+    few_enough("vertices", vertices, limits)?;
+    let mut geometry = Geometry { points: Vec::with_capacity(vertices), first_used: Vec::new(), triangles: 0 };
+    let mut used = vec![false; vertices];
+    for statement in statements.clone() {
+        match statement.kind {
+            Kind::Vertex => geometry.points.push(point(&statement)?),
+            Kind::Face => {
+                geometry.face(&statement, &mut used)?;
+                few_enough("triangles", geometry.triangles, limits)?;
             }
         }
     }
     Ok(geometry)
 }
 
-fn shown(text: &str) -> String {
-    text.trim().chars().take(60).collect::<String>().escape_debug().to_string()
+fn few_enough(what: &'static str, count: usize, limits: &Limits) -> Result<(), ObjError> {
+    let (count, limit) = (count as u64, limits.elements);
+    if count <= limit { Ok(()) } else { Err(ObjError::TooMany { what, count, limit }) }
+}
+
+fn syntax(statement: &Statement) -> ObjError {
+    let mut text = Vec::new();
+    statement.write(&mut text);
+    ObjError::Syntax { line: statement.line, text: shown(&text) }
+}
+
+/// The coordinates of a vertex.
+fn point(statement: &Statement) -> Result<Vec3, ObjError> {
+    let (mut point, mut numbers) = ([0.0; 3], statement.numbers());
+    for c in &mut point {
+        let word = numbers.next().ok_or_else(|| syntax(statement))?;
+        *c = float(word).ok_or_else(|| syntax(statement))?;
+        if !c.is_finite() {
+            return Err(ObjError::NotFinite { line: statement.line, value: shown(word) });
+        }
+    }
+    Ok(point)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
-        super::read(bytes).map(|content| content.soup)
-    }
+    use crate::formats::Nothing;
     use pipeline::mesh::SoupError;
+
+    fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
+        limited(bytes, &Limits::default())
+    }
+
+    fn limited(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, ReadError> {
+        super::read(&Source { bytes, limits, beside: &Nothing }).map(|content| content.soup)
+    }
 
     const SQUARE: &str = "# caf\u{e9}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
@@ -262,6 +284,22 @@ mod tests {
         assert_eq!(soup.triangles().len(), 2);
         let mesh = pipeline::repair(&soup, &Default::default()).expect("a surface").mesh;
         assert_eq!((mesh.census().vertices, mesh.census().components), (4, 1), "welded again");
+    }
+
+    #[test]
+    fn too_many_vertices_or_triangles_are_refused_by_the_name_of_the_setting() {
+        let limits = Limits { elements: 4, ..Limits::default() };
+        assert!(limited(format!("{SQUARE}f 1 2 3 4\nf 4 3 2 1\n").as_bytes(), &limits).is_ok());
+        let files = [
+            (format!("{SQUARE}v 5 5 5\nf 1 2 3\n"), "5 vertices"),
+            (format!("{SQUARE}{}", "f 1 2 3\n".repeat(5)), "5 triangles"),
+            (format!("{SQUARE}{}", "f 1 2 3 4\n".repeat(3)), "6 triangles"),
+        ];
+        for (file, what) in files {
+            let reason = limited(file.as_bytes(), &limits).expect_err(what).reason();
+            assert!(reason.code == Code::TooLarge && reason.message.contains(what), "{reason:?}");
+            assert!(reason.message.contains("`elements` in the table [limits] of planish.toml"), "{reason:?}");
+        }
     }
 
     #[test]
