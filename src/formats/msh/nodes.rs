@@ -25,12 +25,12 @@ enum Numbering {
     Sparse(Sparse),
 }
 
-/// In tables: no node.
-const GAP: u32 = u32::MAX;
+/// No node.
+pub const NONE: u32 = u32::MAX;
 
 impl Nodes {
     /// Nodes, each with its tag.
-    pub fn new(points: Vec<Vec3>, tags: &[u64]) -> Result<Self, MshError> {
+    pub fn new(points: Vec<Vec3>, tags: Vec<u64>) -> Result<Self, MshError> {
         Ok(Self { points, numbering: Numbering::new(tags)? })
     }
 
@@ -44,31 +44,40 @@ impl Nodes {
             }
             Numbering::Table(first, table) => {
                 let at = usize::try_from(tag.checked_sub(*first)?).ok()?;
-                table.get(at).copied().filter(|node| *node != GAP)
+                table.get(at).copied().filter(|node| *node != NONE)
             }
             Numbering::Sparse(sparse) => sparse.find(tag),
+        }
+    }
+
+    /// The positions of the nodes with these tags, [`NONE`] where there is none.
+    pub fn find_all(&self, tags: &[u64], found: &mut Vec<u32>) {
+        found.clear();
+        match &self.numbering {
+            Numbering::Sparse(sparse) => sparse.find_all(tags, found),
+            _ => found.extend(tags.iter().map(|tag| self.find(*tag).unwrap_or(NONE))),
         }
     }
 }
 
 impl Numbering {
-    fn new(tags: &[u64]) -> Result<Self, MshError> {
+    fn new(tags: Vec<u64>) -> Result<Self, MshError> {
         let first = tags.iter().copied().min().unwrap_or(0);
         let span = tags.iter().copied().max().unwrap_or(0) - first;
         if tags.iter().zip(0..).all(|(tag, i)| tag - first == i) {
             Ok(Self::Run(first))
         } else if span < PLACES * tags.len() as u64 {
-            Self::table(tags, first, span as usize + 1)
+            Self::table(&tags, first, span as usize + 1)
         } else {
             Sparse::new(tags).map(Self::Sparse)
         }
     }
 
     fn table(tags: &[u64], first: u64, places: usize) -> Result<Self, MshError> {
-        let mut table = vec![GAP; places];
+        let mut table = vec![NONE; places];
         for (node, tag) in tags.iter().enumerate() {
             let place = &mut table[(tag - first) as usize];
-            if *place != GAP {
+            if *place != NONE {
                 return Err(MshError::SameNode { node: *tag });
             }
             *place = node as u32;
@@ -94,10 +103,13 @@ mod tests {
         ];
         for tags in rows {
             let points = vec![[0.0; 3]; tags.len()];
-            let nodes = Nodes::new(points, tags).expect("distinct tags");
+            let nodes = Nodes::new(points, tags.to_vec()).expect("distinct tags");
             for tag in [0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 1 << 40, u64::MAX - 1, u64::MAX] {
                 let expected = tags.iter().position(|t| *t == tag).map(|at| at as u32);
                 assert_eq!(nodes.find(tag), expected, "{tag} among {tags:?}");
+                let mut found = vec![7];
+                nodes.find_all(&[tag], &mut found);
+                assert_eq!(found, [expected.unwrap_or(NONE)], "{tag} among {tags:?}");
             }
         }
     }
@@ -105,7 +117,7 @@ mod tests {
     #[test]
     fn equal_tags_are_refused() {
         for tags in [[1, 2, 2], [5, 5, 5], [1, u64::MAX, 1]] {
-            let twice = Nodes::new(vec![[0.0; 3]; 3], &tags).map(|nodes| nodes.points);
+            let twice = Nodes::new(vec![[0.0; 3]; 3], tags.to_vec()).map(|nodes| nodes.points);
             assert!(matches!(twice, Err(MshError::SameNode { .. })), "{tags:?}");
         }
     }

@@ -2,10 +2,13 @@
 //!
 //! Whatever is not plain is left to [`Surface::element`], which tells what it is.
 
-use super::nodes::Nodes;
+use super::nodes::NONE;
 use super::shapes::{Kind, Shape};
 use super::surface::Surface;
 use super::values::Binary;
+
+/// Elements whose nodes are looked up together.
+const BATCH: usize = 256;
 
 /// How the elements of a block lie in the bytes.
 #[derive(Clone, Copy, Debug)]
@@ -33,46 +36,45 @@ impl Surface<'_> {
 
     /// The same, for elements of `C` corners, and numbers of `N` bytes.
     fn records<const N: usize, const C: usize>(&mut self, binary: &mut Binary, layout: Layout, most: u64) -> u64 {
-        let Some(before) = layout.before.checked_mul(layout.size).and_then(|b| usize::try_from(b).ok()) else {
+        let nodes = layout.shape.nodes;
+        let before = layout.before.checked_mul(layout.size).and_then(|bytes| usize::try_from(bytes).ok());
+        let Some((before, size)) = before.and_then(|before| Some((before, before.checked_add(N * nodes)?))) else {
             return 0;
         };
-        let Some(size) = before.checked_add(N * layout.shape.nodes) else { return 0 };
-        let most = usize::try_from(most).unwrap_or(usize::MAX);
-        let records = binary.file[binary.at..].chunks_exact(size).take(most);
-        let big = binary.big;
-        let mut found = 0;
-        for record in records {
-            let (corners, others) = record[before..].as_chunks::<N>().0.split_at(C);
-            // The first number is the tag of the element.
-            let tag = record.first_chunk::<N>().map_or(u64::MAX, |tag| number(*tag, big));
-            if N == size_of::<i32>() && tag > i32::MAX as u64 {
+        let most = usize::try_from(most).unwrap_or(usize::MAX).min((binary.file.len() - binary.at) / size);
+        let (mut tags, mut found) = (Vec::new(), Vec::new());
+        let mut done = 0;
+        for batch in binary.file[binary.at..][..most * size].chunks(BATCH * size) {
+            tags.clear();
+            for record in batch.chunks_exact(size).take_while(|record| has_tag::<N>(record, binary.big)) {
+                tags.extend(record[before..].as_chunks::<N>().0.iter().map(|node| number(*node, binary.big)));
+            }
+            self.nodes.find_all(&tags, &mut found);
+            let whole = found.chunks_exact(nodes).take_while(|nodes| !nodes.contains(&NONE));
+            let added = whole.map(|nodes| self.record::<C>(nodes)).count();
+            done += added;
+            if added * size < batch.len() {
                 break;
             }
-            let Some(corners) = corners_of::<N, C>(&self.nodes, corners, big) else { break };
-            if !others.iter().all(|node| self.mid(number(*node, big))) {
-                break;
-            }
-            self.face(&corners);
-            found += 1;
         }
-        binary.at += found * size;
-        found as u64
+        binary.at += done * size;
+        done as u64
     }
 
-    /// Marks a node as one in the middle of an edge or face; whether there is one.
-    fn mid(&mut self, tag: u64) -> bool {
-        self.nodes.find(tag).map(|node| self.mark(node)).is_some()
+    /// Adds an element of `C` corners.
+    fn record<const C: usize>(&mut self, nodes: &[u32]) {
+        let (corners, others) = nodes.split_at(C);
+        others.iter().for_each(|mid| self.mark(*mid));
+        if let Some(corners) = corners.first_chunk::<C>() {
+            self.face(corners);
+        }
     }
 }
 
-/// The positions of all corners, if there are such nodes.
-#[inline]
-fn corners_of<const N: usize, const C: usize>(nodes: &Nodes, bytes: &[[u8; N]], big: bool) -> Option<[u32; C]> {
-    let mut corners = [0; C];
-    for (corner, bytes) in corners.iter_mut().zip(bytes) {
-        *corner = nodes.find(number(*bytes, big))?;
-    }
-    Some(corners)
+/// Whether an element has a tag that it may have, which is the first of its numbers: none is negative.
+fn has_tag<const N: usize>(record: &[u8], big: bool) -> bool {
+    let tag = record.first_chunk::<N>().map_or(u64::MAX, |tag| number(*tag, big));
+    N > size_of::<i32>() || tag <= i32::MAX as u64
 }
 
 /// A number of `N` bytes. A negative int becomes one that is too large for a tag among ints.

@@ -70,7 +70,7 @@ pub fn nodes_2<'a, V: Values<'a>>(values: &mut V, parametric: bool, limits: &Lim
             values.skip(numbers, V::DOUBLE)?;
         }
     }
-    Ok(Nodes::new(nodes.points, &nodes.tags)?)
+    Ok(Nodes::new(nodes.points, nodes.tags)?)
 }
 
 /// `$Nodes` of MSH 4.1.
@@ -95,7 +95,7 @@ pub fn nodes_4<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nod
         }
     }
     all(values, "nodes", nodes.tags.len() as u64, count)?;
-    Ok(Nodes::new(nodes.points, &nodes.tags)?)
+    Ok(Nodes::new(nodes.points, nodes.tags)?)
 }
 
 /// Checks that a block has no more records than are left of those declared for all.

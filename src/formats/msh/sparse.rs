@@ -6,6 +6,7 @@
 //! halving: no choice of tags takes more than a sort.
 
 use super::MshError;
+use super::nodes::NONE;
 
 /// More tags in one bucket are a crowd.
 const CROWD: u32 = 16;
@@ -13,13 +14,16 @@ const CROWD: u32 = 16;
 /// The golden ratio, of 2^64: scatters what lies close together.
 const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// Tags and positions, by bucket.
+/// Nodes by bucket.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Sparse {
     scatter: Scatter,
     /// Where each bucket begins, and the end of the last one.
     starts: Vec<u32>,
-    tags: Vec<(u64, u32)>,
+    /// Positions, by bucket; and two more, so that two can be looked at wherever a bucket begins.
+    nodes: Vec<u32>,
+    /// The tag of each node.
+    tags: Vec<u64>,
 }
 
 /// Which bucket a tag belongs to.
@@ -45,25 +49,25 @@ impl Scatter {
 }
 
 impl Sparse {
-    /// Finds the positions of tags, each of which may be there once.
-    pub fn new(tags: &[u64]) -> Result<Self, MshError> {
+    /// Finds the nodes with these tags, each of which may be there once.
+    pub fn new(tags: Vec<u64>) -> Result<Self, MshError> {
         let first = tags.iter().copied().min().unwrap_or(0);
         let span = tags.iter().copied().max().unwrap_or(0) - first;
         let bits = tags.len().max(2).next_power_of_two().ilog2();
         let mut scatter = Scatter { first, factor: 1, shift: (u64::BITS - span.leading_zeros()).saturating_sub(bits) };
-        let mut counts = scatter.counts(tags, 1 << bits);
+        let mut counts = scatter.counts(&tags, 1 << bits);
         if counts.iter().any(|count| *count > CROWD) {
             scatter = Scatter { first, factor: GOLDEN, shift: u64::BITS - bits };
-            counts = scatter.counts(tags, 1 << bits);
+            counts = scatter.counts(&tags, 1 << bits);
         }
-        let mut sparse = Self { scatter, starts: counts, tags: vec![(0, 0); tags.len()] };
-        sparse.fill(tags);
+        let mut sparse = Self { scatter, starts: counts, nodes: vec![0; tags.len() + 2], tags };
+        sparse.fill();
         sparse.sort()?;
         Ok(sparse)
     }
 
-    /// Puts tags into their buckets, whose sizes are known.
-    fn fill(&mut self, tags: &[u64]) {
+    /// Puts nodes into their buckets, whose sizes are known.
+    fn fill(&mut self) {
         let mut end = 0;
         for start in &mut self.starts {
             end += *start;
@@ -71,20 +75,21 @@ impl Sparse {
         }
         self.starts.push(end);
         // Each bucket is filled from its end: what is left of the ends are the starts.
-        for (node, tag) in tags.iter().enumerate().rev() {
+        for (node, tag) in self.tags.iter().enumerate().rev() {
             let start = &mut self.starts[self.scatter.bucket(*tag)];
             *start -= 1;
-            self.tags[*start as usize] = (*tag, node as u32);
+            self.nodes[*start as usize] = node as u32;
         }
     }
 
-    /// Sorts each bucket; an error if a tag is there twice.
+    /// Sorts each bucket by tags; an error if a tag is there twice.
     fn sort(&mut self) -> Result<(), MshError> {
+        let tag = |node: &u32| self.tags[*node as usize];
         for bucket in self.starts.windows(2).filter(|bucket| bucket[1] - bucket[0] > 1) {
-            let tags = &mut self.tags[bucket[0] as usize..bucket[1] as usize];
-            tags.sort_unstable();
-            if let Some(pair) = tags.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-                return Err(MshError::SameNode { node: pair[0].0 });
+            let nodes = &mut self.nodes[bucket[0] as usize..bucket[1] as usize];
+            nodes.sort_unstable_by_key(tag);
+            if let Some(pair) = nodes.windows(2).find(|pair| tag(&pair[0]) == tag(&pair[1])) {
+                return Err(MshError::SameNode { node: tag(&pair[0]) });
             }
         }
         Ok(())
@@ -95,9 +100,21 @@ impl Sparse {
     pub fn find(&self, tag: u64) -> Option<u32> {
         let bucket = self.scatter.bucket(tag);
         let [start, end] = *self.starts.get(bucket..)?.first_chunk()?;
-        let tags = &self.tags[start as usize..end as usize];
-        let at = tags.binary_search_by_key(&tag, |(tag, _)| *tag).ok()?;
-        Some(tags[at].1)
+        let nodes = &self.nodes[start as usize..end as usize];
+        let at = nodes.binary_search_by_key(&tag, |node| self.tags[*node as usize]).ok()?;
+        Some(nodes[at])
+    }
+
+    /// Adds the positions of tags, [`NONE`] for those that are not there. Memory is slow to reach, so all is asked for
+    /// before anything is looked at; and most buckets have one node or two.
+    pub fn find_all(&self, tags: &[u64], found: &mut Vec<u32>) {
+        let start = |tag: &u64| self.starts.get(self.scatter.bucket(*tag)).map_or(0, |start| *start as usize);
+        let starts: Vec<usize> = tags.iter().map(start).collect();
+        let near: Vec<[u32; 2]> = starts.iter().map(|at| [self.nodes[*at], self.nodes[*at + 1]]).collect();
+        for (tag, near) in tags.iter().zip(near) {
+            let node = near.into_iter().find(|node| self.tags[*node as usize] == *tag);
+            found.push(node.or_else(|| self.find(*tag)).unwrap_or(NONE));
+        }
     }
 }
 
@@ -113,12 +130,15 @@ mod tests {
             ("falling", |i| u64::MAX - 1000 * i),
             ("in clumps", |i| (i / 100) << 50 | i % 100),
             ("one far away", |i| if i == 5 { u64::MAX } else { i }),
-            ("powers", |i| (1 << (i % 60)) + (i / 60) * 3),
+            ("powers", |i| (1 << (10 + i % 50)) + i / 50),
             ("random", |i| (i + 1).wrapping_mul(GOLDEN)),
         ];
         for (sort, tag) in sorts {
             let tags: Vec<u64> = (0..600).map(tag).collect();
-            let sparse = Sparse::new(&tags).unwrap_or_else(|e| panic!("{sort}: {e}"));
+            let sparse = Sparse::new(tags.clone()).unwrap_or_else(|e| panic!("{sort}: {e}"));
+            let mut found = Vec::new();
+            sparse.find_all(&tags, &mut found);
+            assert_eq!(found, (0..600).collect::<Vec<u32>>(), "{sort}");
             for (node, tag) in tags.iter().enumerate() {
                 assert_eq!(sparse.find(*tag), Some(node as u32), "{sort}");
                 let next = tag.wrapping_add(1);
@@ -130,6 +150,6 @@ mod tests {
     #[test]
     fn equal_tags_are_refused() {
         let tags: Vec<u64> = (0..100).map(|i| (i % 99) << 40).collect();
-        assert_eq!(Sparse::new(&tags), Err(MshError::SameNode { node: 0 }));
+        assert_eq!(Sparse::new(tags), Err(MshError::SameNode { node: 0 }));
     }
 }
