@@ -298,10 +298,9 @@ fn input(job: &Job, content: Option<&[u8]>) -> Input {
 
 fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
     let settings = &travel.shared.settings;
-    match travel.compute(Stage::Decompose, |host| stages::cut(&soup, settings, &mut report, host)) {
+    match travel.compute(Stage::Decompose, |host| stages::cut(soup, settings, &mut report, host)) {
         Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
         Ok((mesh, parts)) => {
-            drop(soup);
             let surface = Surface::new(travel, mesh, parts.len(), report);
             for (i, chart) in parts.into_iter().enumerate() {
                 hand_on(charts, Cut { surface: surface.clone(), place: (i, 0), chart });

@@ -164,12 +164,14 @@ pub fn repaired(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Re
 /// # Errors
 /// The refusal, or that the result is no longer wanted.
 pub fn cut(
-    soup: &TriangleSoup,
+    soup: TriangleSoup,
     settings: &Settings,
     report: &mut Report,
     host: &dyn Host,
 ) -> Result<(SurfaceMesh, Vec<Chart>), Stopped> {
-    let found = repaired(soup, settings)?;
+    let found = repaired(&soup, settings)?;
+    // The surface is all that is needed from here on.
+    drop(soup);
     report.surface = Some(report::surface(&found));
     report.repairs = Some(report::repairs(&found.report));
     let atlas = pipeline::decompose(&found.mesh, &settings.decompose(), host).map_err(not_cut)?;
