@@ -139,10 +139,10 @@ impl Walk<'_> {
 
 /// Goes through the triangles of a list, a strip or a fan (glTF 2.0, 3.7.2.1).
 fn for_triangles(mode: Mode, corners: &[u32], mut add: impl FnMut([u32; 3])) {
-    let threes = corners.windows(3).enumerate();
+    let threes = corners.windows(3);
     match mode {
-        Mode::TriangleStrip => threes.for_each(|(i, t)| add([t[0], t[1 + i % 2], t[2 - i % 2]])),
-        Mode::TriangleFan => threes.for_each(|(_, t)| add([t[1], t[2], corners[0]])),
+        Mode::TriangleStrip => threes.enumerate().for_each(|(i, t)| add([t[0], t[1 + i % 2], t[2 - i % 2]])),
+        Mode::TriangleFan => threes.for_each(|t| add([t[1], t[2], corners[0]])),
         _ => corners.as_chunks().0.iter().for_each(|t| add(*t)),
     }
 }

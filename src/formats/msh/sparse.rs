@@ -128,7 +128,7 @@ mod tests {
         let sorts: [(&str, Tag); 6] = [
             ("rising", |i| 1000 * i + 7),
             ("falling", |i| u64::MAX - 1000 * i),
-            ("in clumps", |i| (i / 100) << 50 | i % 100),
+            ("in clumps", |i| ((i / 100) << 50) + i % 100),
             ("one far away", |i| if i == 5 { u64::MAX } else { i }),
             ("powers", |i| (1 << (10 + i % 50)) + i / 50),
             ("random", |i| (i + 1).wrapping_mul(GOLDEN)),
