@@ -111,7 +111,7 @@ impl Walk<'_> {
         let Some(positions) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) else {
             return Err(fail("no positions"));
         };
-        let points = self.accessors.positions(*positions)?;
+        let mut points = self.accessors.positions(*positions)?;
         let corners = match primitive.indices {
             Some(indices) => self.accessors.indices(indices)?,
             None => (0..points.len() as u32).collect(),
@@ -126,7 +126,13 @@ impl Walk<'_> {
             let problem = format!("{total} points or triangles with all instances, more than {}", self.most);
             return Err(GltfError::TooMuch { place: place.to_owned(), problem });
         }
-        self.scene.points.extend(points.iter().map(|p| transform.of_point(*p)));
+        points.iter_mut().for_each(|p| *p = transform.of_point(*p));
+        if base == 0 {
+            self.scene.points = points;
+        } else {
+            self.scene.points.extend(points);
+        }
+        self.scene.triangles.reserve(corners.len() / 3);
         let base = base as u32;
         let is_mirrored = transform.determinant() < 0.0;
         for_triangles(mode, &corners, |[a, b, c]| {
