@@ -200,7 +200,12 @@ pub(super) fn unpack<'a>(
     let mut bytes = Vec::new();
     for (block, packed) in header.sizes.iter().enumerate() {
         let packed = stream.take(*packed)?;
-        unpacker.block(&packed, header.size_of(block), block, &mut bytes)?;
+        let before = bytes.len();
+        unpacker.block(&packed, header.size_of(block), block, &mut bytes).or_else(|damaged| {
+            bytes.truncate(before);
+            let is_empty = header.may_end_with_nothing(block) && unpacker.block(&packed, 0, block, &mut bytes).is_ok();
+            if is_empty { Ok(()) } else { Err(damaged) }
+        })?;
     }
     Ok(Cow::Owned(bytes))
 }
@@ -212,6 +217,8 @@ struct Header {
     /// The size of a block, and of the last one, before compression.
     block: u64,
     last: u64,
+    /// Whether the size of the last block is not told.
+    untold: bool,
     /// The sizes of all blocks.
     packed: u64,
     unpacked: u64,
@@ -221,14 +228,20 @@ impl Header {
     fn read(stream: &mut Stream, packing: Packing) -> Result<Self, PackedError> {
         let header = stream.sizes(3, packing)?;
         let (blocks, block) = (header[0], header[1]);
-        let last = if header[2] == 0 { block } else { header[2] };
+        let untold = header[2] == 0;
+        let last = if untold { block } else { header[2] };
         let sizes = stream.sizes(blocks, packing)?;
         let packed = sizes.iter().fold(0, |sum: u64, size| sum.saturating_add(*size));
         let unpacked = blocks.saturating_sub(1).saturating_mul(block).saturating_add(if blocks > 0 { last } else { 0 });
         if packed > stream.len() {
             return Err(PackedError::Short { needed: packed, there: stream.len() });
         }
-        Ok(Self { sizes, block, last, packed, unpacked })
+        Ok(Self { sizes, block, last, untold, packed, unpacked })
+    }
+
+    /// Whether nothing may be in a block: some writers (vtkio 0.7) add such a one where all others are full.
+    fn may_end_with_nothing(&self, block: usize) -> bool {
+        self.untold && block + 1 == self.sizes.len()
     }
 
     fn size_of(&self, block: usize) -> u64 {
@@ -304,6 +317,45 @@ fn inflate(zlib: &mut flate2::Decompress, packed: &[u8], unpacked: usize, to: &m
             }
             Ok(_) if moved && unpacked > STEP => {}
             _ => return false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    /// These blocks, as if each had eight bytes.
+    fn packed(compressor: Compressor, blocks: &[&[u8]]) -> Vec<u8> {
+        let pack = |block: &&[u8]| match compressor {
+            Compressor::Lz4 => lz4_flex::block::compress(block),
+            _ => {
+                let mut zlib = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+                zlib.write_all(block).expect("written");
+                zlib.finish().expect("written")
+            }
+        };
+        let packed: Vec<Vec<u8>> = blocks.iter().map(pack).collect();
+        let sizes = packed.iter().map(Vec::len);
+        let header: Vec<usize> = [blocks.len(), 8, 0].into_iter().chain(sizes).collect();
+        [header.iter().flat_map(|n| n.to_le_bytes()).collect(), packed.concat()].concat()
+    }
+
+    #[test]
+    fn nothing_may_follow_full_blocks() {
+        let (full, none) = (b"12345678".as_slice(), b"".as_slice());
+        for compressor in [Compressor::Zlib, Compressor::Lz4] {
+            let packing = Packing { order: Order::Little, wide: true, compressor: Some(compressor) };
+            let unpacked = |blocks: &[&[u8]]| {
+                let bytes = packed(compressor, blocks);
+                unpack(Stream::Raw(&bytes), packing, &mut Budget::new(bytes.len(), 1000)).map(Cow::into_owned)
+            };
+            assert_eq!(unpacked(&[full, full]).expect("two"), b"1234567812345678");
+            assert_eq!(unpacked(&[full, full, none]).expect("two and nothing"), b"1234567812345678");
+            for broken in [[full, none, full], [full, full, b"1"], [none, none, none]] {
+                assert!(matches!(unpacked(&broken), Err(PackedError::Block { .. })), "{compressor:?}");
+            }
         }
     }
 }
