@@ -2,9 +2,16 @@
 
 use super::{GltfError, Source, broken, shown};
 use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::{Index, Root, buffer};
 use std::borrow::Cow;
+
+/// Some exporters leave out the padding at the end.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
 
 /// The data of all buffers.
 pub(super) struct Buffers<'a> {
@@ -63,18 +70,20 @@ fn fetch(uri: &str, buffer: usize, most: u64, source: &Source) -> Result<Vec<u8>
 /// What follows `data:`, if it is base64.
 fn embedded(data: &str) -> Option<Vec<u8>> {
     let (kind, text) = data.split_once(',')?;
-    kind.ends_with(";base64").then(|| BASE64_STANDARD.decode(text.trim()).ok()).flatten()
+    kind.to_ascii_lowercase().ends_with(";base64").then(|| BASE64.decode(text.trim()).ok()).flatten()
 }
 
-/// The name of a file, if the address is nothing but that: no scheme, no folder, nothing hidden.
+/// The name of a file, if the address is nothing but that: no scheme, no folder but that of the document (`./`), nothing
+/// hidden.
 pub(super) fn plain_name(uri: &str) -> Option<String> {
-    let name = percent_decoded(uri)?;
+    let decoded = percent_decoded(uri)?;
+    let name = decoded.strip_prefix("./").unwrap_or(&decoded);
     let is_plain = !name.is_empty()
         && name.len() <= 255
         && !name.starts_with('.')
         && !name.contains(['/', '\\', ':', '\0'])
         && !name.chars().any(char::is_control);
-    is_plain.then_some(name)
+    is_plain.then(|| name.to_owned())
 }
 
 /// `%20` is a blank.

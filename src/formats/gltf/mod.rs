@@ -10,6 +10,7 @@ mod accessor;
 mod buffers;
 mod container;
 mod scene;
+mod tidy;
 
 use super::{Content, Notes, ReadError, Source};
 use crate::outcome::Code;
@@ -17,6 +18,7 @@ use buffers::Buffers;
 use gltf::json::Root;
 use pipeline::mesh::TriangleSoup;
 use scene::Scene;
+use tidy::Document;
 
 /// Why bytes are no glTF file.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -109,7 +111,19 @@ fn broken(place: String, problem: impl ToString) -> GltfError {
 }
 
 /// Extensions that change nothing in the shape of the surface, or are read here.
-const HARMLESS: [&str; 2] = ["KHR_mesh_quantization", "KHR_texture_transform"];
+const HARMLESS: [&str; 11] = [
+    "ADOBE_materials_clearcoat_specular",
+    "EXT_lights_image_based",
+    "EXT_mesh_features",
+    "EXT_structural_metadata",
+    "KHR_animation_pointer",
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+    "KHR_techniques_webgl",
+    "KHR_texture_transform",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+];
 
 /// Reads a glTF or GLB file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
@@ -126,10 +140,15 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
 }
 
 fn parse(json: &[u8]) -> Result<Root, GltfError> {
-    let bare = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-    let root = Root::from_slice(bare).map_err(|e| GltfError::Json { line: e.line(), problem: e.to_string() })?;
-    let version = &root.asset.version;
-    if version.split('.').next() == Some("2") { Ok(root) } else { Err(GltfError::Version(shown(version))) }
+    // Some containers are filled up with zeros instead of blanks.
+    let end = json.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1);
+    let bare = json[..end].strip_prefix(b"\xef\xbb\xbf").unwrap_or(&json[..end]);
+    let fail = |e: serde_json::Error| GltfError::Json { line: e.line(), problem: e.to_string() };
+    let document = Document::new(bare).map_err(fail)?;
+    match document.version() {
+        Some(version) if version.split('.').next() != Some("2") => Err(GltfError::Version(shown(&version))),
+        _ => Root::from_slice(&document.tidied()).map_err(fail),
+    }
 }
 
 /// Refuses by name what the surface could not be read without.

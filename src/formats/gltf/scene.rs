@@ -109,7 +109,9 @@ impl Walk<'_> {
             return Ok(());
         }
         let Some(positions) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) else {
-            return Err(fail("no positions"));
+            // Such a primitive is not shown, and breaks nothing (glTF 2.0, 3.7.2.1).
+            *self.scene.skipped.entry("primitive without positions").or_insert(0) += 1;
+            return Ok(());
         };
         let mut points = self.accessors.positions(*positions)?;
         let corners = match primitive.indices {

@@ -214,6 +214,10 @@ fn nothing_is_asked_for_but_plain_names() {
         "%",
         "~/../a",
         "a.bin%00",
+        "././a.bin",
+        "./../a.bin",
+        "./.hidden",
+        "./",
     ];
     for uri in foreign {
         let asked = Recorder::default();
@@ -226,7 +230,13 @@ fn nothing_is_asked_for_but_plain_names() {
         assert!(asked.0.borrow().is_empty(), "{uri}");
     }
     let asked = Recorder::default();
-    for (uri, name) in [("a.bin", "a.bin"), ("my%20file.bin", "my file.bin"), ("caf\u{e9}.bin", "caf\u{e9}.bin")] {
+    let plain = [
+        ("a.bin", "a.bin"),
+        ("my%20file.bin", "my file.bin"),
+        ("caf\u{e9}.bin", "caf\u{e9}.bin"),
+        ("./a%20b.bin", "a b.bin"),
+    ];
+    for (uri, name) in plain {
         let document = with_uri(uri);
         let source = Source { bytes: document.as_bytes(), limits: &Limits::default(), beside: &asked };
         super::super::read(Format::Gltf, &source).expect("beside");
@@ -254,7 +264,6 @@ fn what_is_broken_is_named() {
         ("/bufferViews/0/byteStride", json!(4), "accessors[0]"),
         ("/buffers/0/byteLength", json!(61), "buffers[0]"),
         ("/meshes/0/primitives/0/mode", json!(9), "meshes[0].primitives[0]"),
-        ("/meshes/0/primitives/0/attributes", json!({}), "meshes[0].primitives[0]"),
         ("/meshes/0/primitives/0/indices", json!(7), "accessors[7]"),
         ("/nodes/0/mesh", json!(3), "meshes[3]"),
         ("/nodes/0/children", json!([0]), "nodes[0]"),
@@ -275,6 +284,56 @@ fn what_is_broken_is_named() {
         read_alone(Format::Gltf, b"{\n\"asset\": 1}"),
         Err(ReadError::Gltf(GltfError::Json { line: 2, .. }))
     ));
+}
+
+#[test]
+fn what_no_surface_needs_does_no_harm() {
+    let rows = [
+        ("/materials", json!([{"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1]}}, {"normalTexture": {}}])),
+        ("/animations", json!([{"channels": [{"sampler": 0, "target": {"path": "pointer"}}], "samplers": []}])),
+        ("/scenes/1", json!({"name": "nothing yet"})),
+        ("/extras", json!([1, "a"])),
+        ("/nodes/0/extras", json!(3)),
+        ("/meshes/0/primitives/0/extras", json!("text")),
+        ("/meshes/0/primitives/1", json!({"attributes": {"NORMAL": 0}})),
+        ("/extensionsRequired", json!(["KHR_animation_pointer", "KHR_texture_basisu", "KHR_lights_punctual"])),
+        ("/buffers/0/uri", format!("data:;BASE64,{}", BASE64_STANDARD.encode(data())).into()),
+    ];
+    let plain = soup(&square());
+    for (path, value) in rows {
+        assert_eq!(soup(&changed(&[(path, value)])), plain, "{path}");
+    }
+    let long = [data(), vec![0]].concat();
+    let unpadded = data_uri(&long).trim_end_matches('=').to_owned();
+    assert_eq!(soup(&changed(&[("/buffers/0/uri", unpadded.into())])), plain);
+}
+
+#[test]
+fn primitives_without_positions_are_counted() {
+    let content =
+        read(&changed(&[("/meshes/0/primitives/1", json!({"attributes": {"NORMAL": 0}}))])).expect("a square");
+    assert_eq!(content.notes.skipped["primitive without positions"], 1);
+    assert!(matches!(read(&changed(&[("/meshes/0/primitives/0/attributes", json!({}))])), Err(ReadError::Soup(_))));
+}
+
+#[test]
+fn containers_may_be_filled_up_with_zeros() {
+    let mut document = changed(&[("/buffers/0", json!({"byteLength": 60}))]);
+    // A length that leaves room.
+    document["asset"]["generator"] = "".into();
+    while document.to_string().len() % 4 != 1 {
+        document["asset"]["generator"] = format!("{}.", document["asset"]["generator"].as_str().expect("text")).into();
+    }
+    let mut bytes = glb(&document, &data());
+    let end = 20 + document.to_string().len();
+    bytes[end..end + 3].fill(0);
+    assert_eq!(read_alone(Format::Gltf, &bytes).expect("a container").soup, soup(&square()));
+}
+
+#[test]
+fn version_one_is_refused_by_name() {
+    let document = json!({"asset": {"version": "1.0"}, "meshes": {"a": {}}, "accessors": {}, "nodes": {}});
+    assert_eq!(error(&document), GltfError::Version("1.0".to_owned()));
 }
 
 /// Two hundred nodes show a mesh each, the mesh of all points: far more than the file has.

@@ -1,0 +1,122 @@
+//! A document as the library is to see it, without what no surface needs.
+//!
+//! The library is strict about all of a document: one material with a colour of three numbers, one animation of
+//! something else than a node (`KHR_animation_pointer`), one scene without nodes, which may be, and it refuses the whole.
+//! So what is not read is emptied, and such scenes are completed. Lines keep their numbers, for messages.
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::value::RawValue;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// The lists of a document that are not read.
+const UNREAD: [&str; 7] = ["animations", "cameras", "images", "materials", "samplers", "skins", "textures"];
+
+/// What follows the opening brace of a scene without nodes.
+const NO_NODES: &str = "\"nodes\":[]";
+
+/// The parts of a document, as text.
+pub(super) struct Document<'a> {
+    json: &'a [u8],
+    parts: BTreeMap<String, &'a RawValue>,
+}
+
+/// A change of the text: another one stands in place of these bytes.
+type Change = (Range<usize>, String);
+
+impl<'a> Document<'a> {
+    /// The parts of this text.
+    pub fn new(json: &'a [u8]) -> Result<Self, serde_json::Error> {
+        Ok(Self { json, parts: serde_json::from_slice(json)? })
+    }
+
+    /// The version that it says to have. In glTF 1 nearly all is told in another way: the library cannot tell.
+    pub fn version(&self) -> Option<String> {
+        #[derive(Deserialize)]
+        struct Asset {
+            version: String,
+        }
+        let asset = self.parts.get("asset")?;
+        serde_json::from_str(asset.get()).ok().map(|asset: Asset| asset.version)
+    }
+
+    /// The text without what is not read.
+    pub fn tidied(&self) -> Vec<u8> {
+        let mut changes: Vec<Change> = UNREAD.iter().filter_map(|name| self.emptied(name)).collect();
+        changes.extend(self.completed_scenes());
+        changes.sort_by_key(|(range, _)| range.start);
+        let (mut tidied, mut at) = (Vec::with_capacity(self.json.len()), 0);
+        for (range, text) in changes {
+            tidied.extend_from_slice(&self.json[at..range.start]);
+            tidied.extend_from_slice(text.as_bytes());
+            at = range.end;
+        }
+        tidied.extend_from_slice(&self.json[at..]);
+        tidied
+    }
+
+    /// A list with nothing in it but the ends of its lines.
+    fn emptied(&self, name: &str) -> Option<Change> {
+        let list = self.parts.get(name)?.get();
+        let lines: String = list.chars().filter(|c| *c == '\n').collect();
+        list.starts_with('[').then(|| (self.range(list), format!("[{lines}]")))
+    }
+
+    /// Scenes that lack their list of nodes.
+    fn completed_scenes(&self) -> Vec<Change> {
+        #[derive(Deserialize)]
+        struct Scene {
+            nodes: Option<IgnoredAny>,
+        }
+        let scenes = self.parts.get("scenes").and_then(|scenes| serde_json::from_str(scenes.get()).ok());
+        let scenes: Vec<&RawValue> = scenes.unwrap_or_default();
+        let lacks_nodes = |scene: &str| {
+            scene.starts_with('{') && serde_json::from_str(scene).is_ok_and(|scene: Scene| scene.nodes.is_none())
+        };
+        let complete = |scene: &str| {
+            let inside = self.range(scene).start + 1;
+            let is_empty = scene[1..].trim_start().starts_with('}');
+            (inside..inside, format!("{NO_NODES}{}", if is_empty { "" } else { "," }))
+        };
+        scenes.into_iter().map(RawValue::get).filter(|scene| lacks_nodes(scene)).map(complete).collect()
+    }
+
+    /// Where a part of the text stands in it.
+    fn range(&self, part: &str) -> Range<usize> {
+        let start = part.as_ptr() as usize - self.json.as_ptr() as usize;
+        start..start + part.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tidied(json: &str) -> String {
+        let document = Document::new(json.as_bytes()).expect("JSON");
+        String::from_utf8(document.tidied()).expect("text")
+    }
+
+    #[test]
+    fn what_is_not_read_is_emptied_and_lines_keep_their_numbers() {
+        let json = "{\"scene\":0,\n \"materials\" : [{\n\"a\":[1,\n2]}] ,\"nodes\":[{}],\n\"skins\":3}";
+        assert_eq!(tidied(json), "{\"scene\":0,\n \"materials\" : [\n\n] ,\"nodes\":[{}],\n\"skins\":3}");
+    }
+
+    #[test]
+    fn scenes_get_the_list_of_nodes_that_they_lack() {
+        let json = r#"{"scenes": [{"nodes":[0]}, { }, {"name":"{x}"}, 3]}"#;
+        assert_eq!(tidied(json), r#"{"scenes": [{"nodes":[0]}, {"nodes":[] }, {"nodes":[],"name":"{x}"}, 3]}"#);
+        for same in ["{}", r#"{"scenes":{}}"#, r#"{"scenes":[]}"#, r#"{"scenes":[{"nodes":1}]}"#] {
+            assert_eq!(tidied(same), same);
+        }
+    }
+
+    #[test]
+    fn the_version_is_told_where_there_is_one() {
+        let version = |json: &str| Document::new(json.as_bytes()).expect("JSON").version();
+        assert_eq!(version(r#"{"asset":{"version":"1.0"},"meshes":{"a":{}}}"#).as_deref(), Some("1.0"));
+        assert_eq!([r#"{"asset":{}}"#, r#"{"asset":{"version":2}}"#, "{}"].map(version), [None, None, None]);
+    }
+}
