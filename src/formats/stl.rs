@@ -24,6 +24,14 @@ pub enum StlError {
         /// Size of the file.
         size: usize,
     },
+    /// Text, but not that of STL.
+    #[error(
+        "the file is text that begins with \"{begins}\", not with \"solid\": it is no STL file, or its first line is missing; export it again"
+    )]
+    NoSolid {
+        /// What it begins with.
+        begins: String,
+    },
     /// There are fewer bytes than the declared number of triangles takes.
     #[error(
         "the header declares {declared} triangles ({needed} bytes), but the file has {size} bytes, room for {room}; it was cut off or is no STL: copy or export it again"
@@ -102,13 +110,15 @@ impl StlError {
             Self::Count { .. } | Self::Excess { .. } => Code::CountMismatch,
             Self::TooMany { .. } => Code::TooLarge,
             Self::BinaryNotFinite { .. } | Self::AsciiNotFinite { .. } => Code::NotFinite,
-            Self::Short { .. } | Self::Syntax { .. } | Self::Truncated { .. } => Code::Malformed,
+            Self::Short { .. } | Self::NoSolid { .. } => Code::Malformed,
+            Self::Syntax { .. } | Self::Truncated { .. } => Code::Malformed,
         }
     }
 
     pub(super) fn place(&self) -> Option<String> {
         Some(match self {
             Self::Short { size } => format!("byte {size}"),
+            Self::NoSolid { .. } => "line 1".to_owned(),
             Self::Count { .. } | Self::Excess { .. } => "byte 80".to_owned(),
             Self::TooMany { .. } => return None,
             Self::BinaryNotFinite { byte, .. } => format!("byte {byte}"),
@@ -128,10 +138,10 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let points = if size_fits {
         few_enough(declared.unwrap_or(0).into(), limit)?;
         binary(&bytes[HEADER..])?
-    } else if begins_with_solid(bytes) {
-        ascii(bytes, limit, &mut notes)?
+    } else if begins_with_solid(unfilled(bytes)) {
+        ascii(unfilled(bytes), limit, &mut notes)?
     } else {
-        return Err(mismatch(declared, bytes.len()).into());
+        return Err(mismatch(declared, bytes).into());
     };
     let triangles = (0..points.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     Ok(Content { soup: TriangleSoup::new(points, triangles)?, notes })
@@ -149,9 +159,13 @@ fn needed(triangles: u32) -> u64 {
     HEADER as u64 + RECORD as u64 * u64::from(triangles)
 }
 
-fn mismatch(declared: Option<u32>, size: usize) -> StlError {
+fn mismatch(declared: Option<u32>, bytes: &[u8]) -> StlError {
+    let size = bytes.len();
+    let is_text = bytes.iter().take(1024).all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace());
     match declared {
         None => StlError::Short { size },
+        // What it would be as a count are four letters.
+        Some(_) if is_text => StlError::NoSolid { begins: shown(text(bytes)) },
         Some(declared) => {
             let (needed, room) = (needed(declared), (size - HEADER) / RECORD);
             if needed > size as u64 {
@@ -168,6 +182,12 @@ fn begins_with_solid(bytes: &[u8]) -> bool {
     let text = text(bytes);
     let word = text.get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
     word && !text.iter().take(1024).any(|b| *b == 0)
+}
+
+/// The bytes without what fills the last block of some text files: zeros, or the end of a text of old systems.
+fn unfilled(bytes: &[u8]) -> &[u8] {
+    let end = bytes.iter().rposition(|b| ![0, 0x1a].contains(b)).map_or(0, |last| last + 1);
+    &bytes[..end]
 }
 
 /// The bytes without a byte order mark and leading blanks.
@@ -281,7 +301,7 @@ fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Vec<[f64; 3]>, S
             }
             // The normal, "outer loop", "endloop": they say nothing that the corners do not.
             (b"normal" | b"outer" | b"loop" | b"endloop", Some(_)) => {}
-            (_, Some(_)) if number(word).is_some() => {}
+            (_, Some(_)) if number(word).is_some() || is_undefined(word) => {}
             (b"color", _) => words.name(),
             _ => return Err(problem(&format!("unexpected \"{}\"", shown(word)))),
         }
@@ -293,6 +313,13 @@ fn number(word: &[u8]) -> Option<f64> {
     std::str::from_utf8(word).ok().and_then(|w| w.parse::<f64>().ok())
 }
 
+/// Whether a word is what Microsoft's libraries write for a number that is none, as in the normal of a triangle without
+/// area: `-nan(ind)`, `-1.#IND`, `1.#QNAN00e+000`.
+fn is_undefined(word: &[u8]) -> bool {
+    let word = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word).to_ascii_lowercase();
+    word.starts_with(b"nan(") || word.starts_with(b"1.#")
+}
+
 /// The three numbers of a vertex; a fourth one is an error.
 fn vertex(words: &mut Words) -> Result<[f64; 3], StlError> {
     let mut point = [0.0; 3];
@@ -301,7 +328,10 @@ fn vertex(words: &mut Words) -> Result<[f64; 3], StlError> {
         let Some((word, _)) = words.next() else {
             return Err(syntax(words.line, "a vertex needs three numbers".to_owned()));
         };
-        *c = number(word).ok_or_else(|| syntax(words.line, format!("\"{}\" is no number", shown(word))))?;
+        let undefined = is_undefined(word).then_some(f64::NAN);
+        *c = number(word)
+            .or(undefined)
+            .ok_or_else(|| syntax(words.line, format!("\"{}\" is no number", shown(word))))?;
         if !c.is_finite() {
             return Err(StlError::AsciiNotFinite { line: words.line, value: shown(word) });
         }
@@ -428,6 +458,37 @@ mod tests {
         assert_eq!(ascii("inf"), StlError::AsciiNotFinite { line: 4, value: "inf".to_owned() });
         assert!(matches!(ascii("1,5"), StlError::Syntax { line: 4, .. }));
         assert!(matches!(ascii("1 2"), StlError::Syntax { line: 4, .. }));
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_passed_over_in_normals_only() {
+        for broken in ["nan", "-nan", "-nan(ind)", "-1.#IND", "1.#QNAN00e+000", "1.#INF"] {
+            let normal = format!("normal {broken} {broken} {broken}");
+            let file = |facet: String| format!("solid\n{facet}endsolid").into_bytes();
+            assert!(read(&file(facet("0").replace("normal 0 0 1", &normal))).is_ok(), "{broken}");
+            let found = error(&file(facet(broken)));
+            assert_eq!(found, StlError::AsciiNotFinite { line: 4, value: broken.to_owned() });
+        }
+        assert!(read(b"solid\nfacet normal a b c").is_err());
+    }
+
+    #[test]
+    fn zeros_may_fill_the_end_of_text() {
+        for facets in [1, 30] {
+            let text = format!("solid\n{}endsolid\n", facet("0").repeat(facets)).into_bytes();
+            for filling in [&[0; 40][..], &[0x1a], b"\x1a\0\0"] {
+                let soup = read(&[&text, filling].concat()).expect("filled up");
+                assert_eq!(soup.triangles().len(), facets);
+            }
+        }
+    }
+
+    #[test]
+    fn text_of_another_kind_is_told() {
+        let found = error(format!("# by hand\nsolid\n{}endsolid\n", facet("0")).as_bytes());
+        let StlError::NoSolid { begins } = &found else { panic!("{found}") };
+        assert!(begins.starts_with("# by hand"));
+        assert_eq!((found.code(), found.place().as_deref()), (Code::Malformed, Some("line 1")));
     }
 
     #[test]
