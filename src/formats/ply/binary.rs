@@ -190,6 +190,11 @@ impl<'a> Values<'a> for Binary<'a> {
             Scalar::U16 => self.array().map(|b| i64::from(u16::from_le_bytes(b))),
             Scalar::I32 => self.array().map(|b| i64::from(i32::from_le_bytes(b))),
             Scalar::U32 => self.array().map(|b| i64::from(u32::from_le_bytes(b))),
+            Scalar::I64 => self.array().map(i64::from_le_bytes),
+            Scalar::U64 => {
+                let number = u64::from_le_bytes(self.array()?);
+                i64::try_from(number).map_err(|_| Bad::Value(format!("{number} is too large")))
+            }
             Scalar::F32 | Scalar::F64 => self.float(scalar).and_then(whole),
         }
     }

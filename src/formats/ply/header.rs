@@ -26,6 +26,8 @@ pub enum Scalar {
     U16,
     I32,
     U32,
+    I64,
+    U64,
     F32,
     F64,
 }
@@ -39,6 +41,9 @@ impl Scalar {
             b"ushort" | b"uint16" => Self::U16,
             b"int" | b"int32" => Self::I32,
             b"uint" | b"uint32" => Self::U32,
+            // Not in the specification; trimesh writes them for attributes.
+            b"long" | b"int64" => Self::I64,
+            b"ulong" | b"uint64" => Self::U64,
             b"float" | b"float32" => Self::F32,
             b"double" | b"float64" => Self::F64,
             _ => return None,
@@ -51,7 +56,7 @@ impl Scalar {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
+            Self::I64 | Self::U64 | Self::F64 => 8,
         }
     }
 
@@ -251,15 +256,14 @@ mod tests {
 
     #[test]
     fn all_types_and_lists_are_known() {
-        let names =
-            "char int8 uchar uint8 short int16 ushort uint16 int int32 uint uint32 float float32 double float64";
+        let names = "char int8 uchar uint8 short int16 ushort uint16 int int32 uint uint32 long int64 ulong uint64 float float32 double float64";
         let lines: String =
             names.split(' ').map(|n| format!("property {n} a{n}\nproperty list uchar {n} b{n}\n")).collect();
         let text = format!("{HEAD}comment\nobj_info  x\nelement thing 3\n{lines}end_header\n1 2 3");
         let header = Header::read(text.as_bytes()).expect("a header");
         let [element] = &header.elements[..] else { panic!("{header:?}") };
         let sizes: Vec<usize> = element.properties.iter().map(|p| p.scalar.size()).step_by(2).collect();
-        assert_eq!(sizes, [1, 1, 1, 1, 2, 2, 2, 2, 4, 4, 4, 4, 4, 4, 8, 8]);
+        assert_eq!(sizes, [1, 1, 1, 1, 2, 2, 2, 2, 4, 4, 4, 4, 8, 8, 8, 8, 4, 4, 8, 8]);
         assert_eq!((element.count, element.line, element.stride(), header.lines), (3, 5, None, 38));
         assert_eq!(element.needed(Encoding::Little), 3 * (52 + 16));
         assert_eq!(&text[header.end..], "1 2 3");

@@ -32,6 +32,7 @@ fn value(word: &str, scalar: Scalar, big: bool) -> Vec<u8> {
         Scalar::I8 | Scalar::U8 => vec![number as i64 as u8],
         Scalar::I16 | Scalar::U16 => (number as i64 as u16).to_le_bytes().to_vec(),
         Scalar::I32 | Scalar::U32 => (number as i64 as u32).to_le_bytes().to_vec(),
+        Scalar::I64 | Scalar::U64 => (number as i64).to_le_bytes().to_vec(),
         Scalar::F32 => (number as f32).to_le_bytes().to_vec(),
         Scalar::F64 => number.to_le_bytes().to_vec(),
     };
@@ -104,9 +105,9 @@ fn other_elements_and_properties_are_passed_over() {
 
 #[test]
 fn values_of_all_types_are_read() {
-    let types = ["char", "uint8", "short", "uint16", "int32", "uint", "float32", "double"];
+    let types = ["char", "uint8", "short", "uint16", "int32", "uint", "long", "uint64", "float32", "double"];
     for (i, scalar) in types.into_iter().enumerate() {
-        let count = types[i.min(5)];
+        let count = types[i.min(7)];
         let list = format!("property list {count} {scalar} vertex_index\n");
         let file = square(&["3 0 1 2", "4 0 1 2 3"]).replace("float ", &format!("{scalar} ")).replace(LIST, &list);
         let found = in_all_encodings(&file);
