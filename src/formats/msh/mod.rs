@@ -13,7 +13,7 @@ mod surface;
 mod values;
 
 use super::place::{Place, shown};
-use super::words::Words;
+use super::words::{Words, float};
 use super::{Content, Limits, Notes, ReadError, Source};
 use crate::outcome::Code;
 use nodes::Nodes;
@@ -221,7 +221,14 @@ enum Version {
 /// Reads an MSH file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let mut words = Words::new(source.bytes, 1);
-    let begins = words.next().unwrap_or_default();
+    let mut begins = words.next().unwrap_or_default();
+    while begins == b"$Comments" {
+        let mut text = Text(words);
+        let fail = || MshError::Truncated { section: "Comments".to_owned(), place: Place::Line(words.line()) };
+        text.until_end(b"Comments").ok_or_else(fail)?;
+        words = text.0;
+        begins = words.next().unwrap_or_default();
+    }
     // Version 1 has no section for the format.
     if begins == b"$NOD" {
         return Err(MshError::Version { version: "1".to_owned() }.into());
@@ -250,9 +257,9 @@ fn format_error(problem: String) -> MshError {
 }
 
 fn version(name: &[u8]) -> Result<Version, MshError> {
-    match name {
-        b"2" | b"2.0" | b"2.1" | b"2.2" => Ok(Version::Two),
-        b"4.1" => Ok(Version::Four),
+    match float(name) {
+        Some(number) if (2.0..=2.2).contains(&number) => Ok(Version::Two),
+        Some(4.1) => Ok(Version::Four),
         _ => Err(MshError::Version { version: shown(name) }),
     }
 }

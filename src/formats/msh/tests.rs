@@ -281,6 +281,23 @@ fn names_are_kept_and_other_sections_passed_over() {
 }
 
 #[test]
+fn comments_may_come_first_and_versions_are_numbers() {
+    let file = |encoding| square().file("2.2", encoding);
+    for encoding in [Ascii, Little] {
+        let comment = b"$Comments\n $MeshFormat of old\n$EndComments\n".to_vec();
+        assert_eq!(content(&[comment, file(encoding)].concat()), content(&file(encoding)));
+    }
+    assert!(matches!(error(b"$Comments\n1 2\n"), MshError::Truncated { .. }));
+    let text = String::from_utf8(file(Ascii)).expect("text");
+    for version in ["2", "2.10", "2.1999999999999997"] {
+        assert!(content(text.replace("2.2", version).as_bytes()).is_ok(), "{version}");
+    }
+    for version in ["2.3", "3", "4", "4.10001", "nan", "x"] {
+        assert!(matches!(error(text.replace("2.2", version).as_bytes()), MshError::Version { .. }), "{version}");
+    }
+}
+
+#[test]
 fn broken_files_are_refused_with_code_and_place() {
     let two = String::from_utf8(square().file("2.2", Ascii)).expect("text");
     let four = String::from_utf8(square().file("4.1", Ascii)).expect("text");
