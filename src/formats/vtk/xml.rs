@@ -12,6 +12,8 @@ use std::borrow::Cow;
 
 /// Reads an XML file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
+    let readable = readable(source.bytes);
+    let source = &Source { bytes: &readable, ..*source };
     let file = outline(source.bytes, source.limits.depth, &[])?;
     let mut surface = Surface::new(source.limits, format(&file));
     let mut arrays = Arrays::new(source, &file);
@@ -19,6 +21,21 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
         arrays.piece(piece, &mut surface)?;
     }
     surface.finish()
+}
+
+/// A file that says to be in an encoding of one byte per letter, with another letter for each that is not ASCII: only
+/// names hold such, which do not matter here, and the library knows UTF-8 only. Appended data stay as they are.
+fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
+    const APPENDED: &[u8] = b"<AppendedData";
+    let prolog = bytes[..bytes.len().min(200)].split(|b| *b == b'>').next().unwrap_or_default().to_ascii_lowercase();
+    let says = |encoding: &[u8]| prolog.windows(encoding.len()).any(|w| w == encoding);
+    if !says(b"iso-8859-") && !says(b"windows-125") && !says(b"latin1") {
+        return Cow::Borrowed(bytes);
+    }
+    let end = bytes.windows(APPENDED.len()).position(|w| w == APPENDED).unwrap_or(bytes.len());
+    let mut readable = bytes.to_vec();
+    readable[..end].iter_mut().filter(|b| !b.is_ascii()).for_each(|b| *b = b'?');
+    Cow::Owned(readable)
 }
 
 /// The format as it is told.

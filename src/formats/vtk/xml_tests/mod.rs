@@ -36,6 +36,18 @@ fn grids_are_read_in_every_encoding() {
 }
 
 #[test]
+fn names_may_be_in_another_encoding_if_the_file_says_so() {
+    for style in styles().into_iter().filter(|s| s.block == 100) {
+        let plain = read_alone(Format::Vtu, &grid(style)).expect("plain");
+        let comment = b"<!-- temp\xe9rature -->";
+        let latin = [b"<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>", &comment[..], &grid(style)].concat();
+        assert_eq!(read_alone(Format::Vtu, &latin).unwrap_or_else(|e| panic!("{style:?}: {e}")), plain);
+        let untold = [b"<?xml version=\"1.0\"?>", &comment[..], &grid(style)].concat();
+        assert!(matches!(error(&untold), VtkError::Syntax { .. }));
+    }
+}
+
+#[test]
 fn polygons_are_read_in_every_encoding() {
     for style in styles() {
         let content = read_alone(Format::Vtp, &polydata(style)).unwrap_or_else(|e| panic!("{style:?}: {e}"));
