@@ -132,6 +132,14 @@ pub enum ReadError {
     /// There are no bytes.
     #[error("the file is empty (0 bytes); export it again")]
     Empty,
+    /// Nothing that any reader reads.
+    #[error("the file is {what}; {remedy}")]
+    Foreign {
+        /// What it is.
+        what: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// Not an STL file.
     #[error(transparent)]
     Stl(#[from] stl::StlError),
@@ -160,6 +168,7 @@ impl ReadError {
     pub fn reason(&self) -> Reason {
         let (code, place) = match self {
             Self::Empty => (Code::EmptyFile, Some("byte 0".to_owned())),
+            Self::Foreign { .. } => (Code::UnsupportedFormat, Some("byte 0".to_owned())),
             Self::Stl(e) => (e.code(), e.place()),
             Self::Obj(e) => (e.code(), e.place()),
             Self::Gltf(e) => (e.code(), e.place()),
@@ -220,13 +229,19 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
     if bytes.is_empty() {
         return Err(ReadError::Empty);
     }
-    match sniff::sniff(bytes).unwrap_or(format) {
+    let sniffed = sniff::sniff(bytes);
+    if let Some((what, remedy)) = sniff::foreign(bytes).filter(|_| sniffed.is_none()) {
+        return Err(ReadError::Foreign { what, remedy });
+    }
+    // Editors put a mark before text. The other readers pass over it themselves: binary STL files may begin with anything.
+    let unmarked = Source { bytes: bytes.strip_prefix(sniff::MARK).unwrap_or(bytes), ..*source };
+    match sniffed.unwrap_or(format) {
         Format::Stl => stl::read(source),
         Format::Obj => obj::read(source),
         Format::Gltf => gltf::read(source),
-        Format::Vtk | Format::Vtu | Format::Vtp => vtk::read(source),
-        Format::Ply => ply::read(source),
-        Format::Msh => msh::read(source),
+        Format::Vtk | Format::Vtu | Format::Vtp => vtk::read(&unmarked),
+        Format::Ply => ply::read(&unmarked),
+        Format::Msh => msh::read(&unmarked),
     }
 }
 
@@ -257,6 +272,39 @@ mod tests {
         }
         assert_eq!(kind(Path::new("scan.xyz")), Kind::Unknown("xyz".to_owned()));
         assert_eq!(kind(Path::new("scan")), Kind::Unknown(String::new()));
+    }
+
+    #[test]
+    fn a_mark_before_text_does_no_harm() {
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                   element face 1\nproperty list uchar int vertex_index\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        let msh = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n\
+                   $Elements\n1\n1 2 0 1 2 3\n$EndElements\n";
+        let vtk = "# vtk DataFile Version 3.0\n\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n\
+                   POLYGONS 1 4\n3 0 1 2\n";
+        for (format, text) in [(Format::Ply, ply), (Format::Msh, msh), (Format::Vtk, vtk)] {
+            let marked = read_alone(format, format!("\u{feff}{text}").as_bytes()).expect("marked");
+            assert_eq!(marked, read_alone(format, text.as_bytes()).expect("plain"), "{format}");
+        }
+    }
+
+    #[test]
+    fn what_no_reader_reads_is_told_by_name() {
+        let utf16: Vec<u8> = "\u{feff}v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let rows: [(&[u8], &str); 5] = [
+            (&utf16, "UTF-16"),
+            (b"\xfe\xff\0v\0 ", "UTF-16"),
+            (b"\x1f\x8b\x08\0\0", "gzip"),
+            (b"PK\x03\x04\x14\0", "zip"),
+            (b"\n<!DOCTYPE html>\n<html>", "web page"),
+        ];
+        for (bytes, what) in rows {
+            for format in [Format::Stl, Format::Obj, Format::Ply, Format::Gltf, Format::Vtu, Format::Msh] {
+                let reason = read_alone(format, bytes).expect_err(what).reason();
+                assert!(reason.message.contains(what), "{}", reason.message);
+                assert_eq!((reason.code, reason.place.as_deref()), (Code::UnsupportedFormat, Some("byte 0")));
+            }
+        }
     }
 
     #[test]

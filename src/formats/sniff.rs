@@ -8,7 +8,7 @@ const FAR: usize = 1024;
 /// The format that these bytes are in, whatever the file is called; none where they do not say so.
 pub(super) fn sniff(bytes: &[u8]) -> Option<Format> {
     let head = &bytes[..bytes.len().min(FAR)];
-    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    let text = head.strip_prefix(MARK).unwrap_or(head).trim_ascii_start();
     let has = |word: &str| text.windows(word.len()).any(|w| w.eq_ignore_ascii_case(word.as_bytes()));
     match text {
         _ if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") => Some(Format::Ply),
@@ -22,6 +22,24 @@ pub(super) fn sniff(bytes: &[u8]) -> Option<Format> {
         _ if is_word(text, "solid") && has("facet") && has("vertex") && !text.contains(&0) => Some(Format::Stl),
         _ if is_binary_stl(bytes) => Some(Format::Stl),
         _ if is_obj(text) => Some(Format::Obj),
+        _ => None,
+    }
+}
+
+/// The mark that some editors put before text in UTF-8.
+pub(super) const MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// What a file is that no reader reads, and what to do, where the first bytes say so.
+pub(super) fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+    let head = &bytes[..bytes.len().min(FAR)];
+    let page = head.strip_prefix(MARK).unwrap_or(head).trim_ascii_start().to_ascii_lowercase();
+    match head {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some(("text in UTF-16", "save it as plain text (ASCII or UTF-8)")),
+        [0x1f, 0x8b, 8, ..] => Some(("compressed by gzip", "unpack it first")),
+        [b'P', b'K', 3, 4, ..] => Some(("a zip archive", "unpack it first")),
+        _ if page.starts_with(b"<!doctype html") || page.starts_with(b"<html") => {
+            Some(("a web page and no mesh", "download the file itself again"))
+        }
         _ => None,
     }
 }
