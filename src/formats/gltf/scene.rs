@@ -38,7 +38,7 @@ impl Scene {
         let most = source.limits.elements.min(source.limits.unpacked(source.bytes.len()) / POINT);
         let accessors = Accessors { root, buffers, most };
         let mut walk = Walk { root, accessors, most, scene: Self::default() };
-        let mut meshes: Vec<(usize, Transform)> = instances(root)?;
+        let mut meshes: Vec<(usize, Transform)> = instances(root, source.limits.depth)?;
         if root.nodes.is_empty() {
             meshes = (0..root.meshes.len()).map(|mesh| (mesh, Transform::IDENTITY)).collect();
         }
@@ -51,9 +51,10 @@ impl Scene {
 
 /// The meshes that nodes show, with their places. Every node is visited once: one with two parents, or above itself,
 /// is an error (glTF 2.0, 3.5.2). So the walk ends.
-fn instances(root: &Root) -> Result<Vec<(usize, Transform)>, GltfError> {
-    let mut waiting: Vec<(Index<Node>, Transform)> = Vec::new();
-    let identity = |node: &Index<Node>| (*node, Transform::IDENTITY);
+fn instances(root: &Root, depth: usize) -> Result<Vec<(usize, Transform)>, GltfError> {
+    // With the number of nodes above each.
+    let mut waiting: Vec<(Index<Node>, Transform, usize)> = Vec::new();
+    let identity = |node: &Index<Node>| (*node, Transform::IDENTITY, 0);
     match root.scene.map(|s| s.value()).or((!root.scenes.is_empty()).then_some(0)) {
         Some(i) => {
             let scene = root.scenes.get(i).ok_or_else(|| broken(format!("scenes[{i}]"), "there is none"))?;
@@ -63,16 +64,20 @@ fn instances(root: &Root) -> Result<Vec<(usize, Transform)>, GltfError> {
     }
     let mut visited = vec![false; root.nodes.len()];
     let mut found = Vec::new();
-    while let Some((index, above)) = waiting.pop() {
+    while let Some((index, above, level)) = waiting.pop() {
         let i = index.value();
         let fail = |problem: &str| broken(format!("nodes[{i}]"), problem);
         let node = root.nodes.get(i).ok_or_else(|| fail("there is none"))?;
         if std::mem::replace(&mut visited[i], true) {
             return Err(fail("it is the child of two nodes, or of itself"));
         }
+        if level >= depth {
+            let problem = format!("nodes are nested more than {depth} deep");
+            return Err(GltfError::TooMuch { place: format!("nodes[{i}]"), problem });
+        }
         let here = above.then(&Transform::of(node));
         found.extend(node.mesh.map(|mesh| (mesh.value(), here)));
-        waiting.extend(node.children.iter().flatten().rev().map(|child| (*child, here)));
+        waiting.extend(node.children.iter().flatten().rev().map(|child| (*child, here, level + 1)));
     }
     Ok(found)
 }

@@ -336,6 +336,19 @@ fn version_one_is_refused_by_name() {
     assert_eq!(error(&document), GltfError::Version("1.0".to_owned()));
 }
 
+#[test]
+fn nodes_are_nested_so_deep_only() {
+    let chain = |depth: usize| {
+        let mut nodes: Vec<Value> = (1..depth).map(|below| json!({"children": [below]})).collect();
+        nodes.push(json!({"mesh": 0}));
+        changed(&[("/nodes", nodes.into())])
+    };
+    let most = Limits::default().depth;
+    assert_eq!(soup(&chain(most)), soup(&square()));
+    let found = error(&chain(most + 1));
+    assert!(matches!(&found, GltfError::TooMuch { place, .. } if *place == format!("nodes[{most}]")), "{found}");
+}
+
 /// Two hundred nodes show a mesh each, the mesh of all points: far more than the file has.
 #[test]
 fn instances_do_not_take_memory_out_of_proportion() {

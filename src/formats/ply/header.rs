@@ -264,8 +264,8 @@ mod tests {
         let [element] = &header.elements[..] else { panic!("{header:?}") };
         let sizes: Vec<usize> = element.properties.iter().map(|p| p.scalar.size()).step_by(2).collect();
         assert_eq!(sizes, [1, 1, 1, 1, 2, 2, 2, 2, 4, 4, 4, 4, 8, 8, 8, 8, 4, 4, 8, 8]);
-        assert_eq!((element.count, element.line, element.stride(), header.lines), (3, 5, None, 38));
-        assert_eq!(element.needed(Encoding::Little), 3 * (52 + 16));
+        assert_eq!((element.count, element.line, element.stride(), header.lines), (3, 5, None, 46));
+        assert_eq!(element.needed(Encoding::Little), 3 * (84 + 20));
         assert_eq!(&text[header.end..], "1 2 3");
     }
 

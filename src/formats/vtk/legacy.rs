@@ -112,6 +112,10 @@ fn unstructured_grid(file: &mut Arrays, surface: &mut Surface) -> Result<(), Vtk
             }
             Some(b"CELL_TYPES") if types.is_none() => types = Some(file.types()?),
             Some(b"FIELD") => file.skip_field()?,
+            // So VTK writes a grid without cells.
+            None | Some(b"POINT_DATA" | b"CELL_DATA") if has_points && cells.is_none() && types.is_none() => {
+                return Ok(());
+            }
             Some(other) => return Err(file.unexpected(other, "POINTS, CELLS or CELL_TYPES")),
             None => return Err(file.ends("POINTS, CELLS and CELL_TYPES")),
         }
@@ -362,6 +366,18 @@ mod tests {
         let volume = ReadError::from(error(&volume.text("CELL_TYPES 1\n").ints(&[10]).bytes)).reason();
         assert_eq!(volume.code, Code::NoTriangles);
         assert!(volume.message.contains("only 1 VTK_TETRA"), "{volume:?}");
+    }
+
+    #[test]
+    fn grids_without_cells_hold_no_triangle() {
+        for rest in ["", "POINT_DATA 1\nSCALARS a int 1\n", "CELLS 0 0\nCELL_TYPES 0\n"] {
+            let file = format!(
+                "{} 3.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 float\n0 0 0\n{rest}",
+                "# vtk DataFile Version"
+            );
+            let reason = read(file.as_bytes()).expect_err("no cells").reason();
+            assert_eq!(reason.code, crate::outcome::Code::NoTriangles, "{}", reason.message);
+        }
     }
 
     #[test]

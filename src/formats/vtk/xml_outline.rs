@@ -163,6 +163,8 @@ struct Search<'a> {
     kind: Option<(&'static str, &'static str)>,
     packing: Packing,
     pieces: Vec<Piece<'a>>,
+    /// Whether there was a piece with nothing in it.
+    has_empty: bool,
     appended: Option<Appended<'a>>,
 }
 
@@ -172,7 +174,7 @@ impl<'a> Search<'a> {
         reader.config_mut().expand_empty_elements = true;
         let packing = Packing { order: Order::Little, wide: false, compressor: None };
         let (path, pieces) = (Vec::new(), Vec::new());
-        Self { bytes, depth, fields, reader, path, kind: None, packing, pieces, appended: None }
+        Self { bytes, depth, fields, reader, path, kind: None, packing, pieces, has_empty: false, appended: None }
     }
 
     /// The byte after what was read last.
@@ -348,6 +350,7 @@ impl<'a> Search<'a> {
         if piece.points == 0 && piece.cells.iter().all(|count| *count == 0) {
             // Nothing is in it; many of them should take no memory.
             self.pieces.pop();
+            self.has_empty = true;
         } else if piece.points > 0 && piece.array(Role::Points).is_none() {
             return Err(self.count("Points of this piece".to_owned(), piece.points));
         }
@@ -376,8 +379,8 @@ impl<'a> Search<'a> {
 
     fn finish(self) -> Result<Outline<'a>, VtkError> {
         let Some((_, kind)) = self.kind else { return Err(self.syntax("there is no <VTKFile> in the file")) };
-        if self.pieces.is_empty() {
-            return Err(self.syntax("there is no <Piece> with points in the file"));
+        if self.pieces.is_empty() && !self.has_empty {
+            return Err(self.syntax("there is no <Piece> in the file"));
         }
         Ok(Outline { kind, packing: self.packing, pieces: self.pieces, appended: self.appended })
     }

@@ -126,6 +126,9 @@ fn wrong_words_and_counts_are_named_with_their_place() {
     }
     assert!(error(b"<?xml version=\"1.0\"?>\n").to_string().contains("no <VTKFile>"));
     assert!(error(b"<VTKFile type=\"PolyData\"><PolyData/></VTKFile>").to_string().contains("no <Piece>"));
+    let empty =
+        b"<VTKFile type=\"PolyData\"><PolyData><Piece NumberOfPoints=\"0\"><Points/></Piece></PolyData></VTKFile>";
+    assert_eq!(read_alone(Format::Vtp, empty).expect_err("empty").reason().code, Code::NoTriangles);
     let bom = [b"\xef\xbb\xbf\n", &polydata(PLAIN)[..]].concat();
     assert!(read_alone(Format::Vtp, &bom).is_ok(), "a byte order mark");
 }
