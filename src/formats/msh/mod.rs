@@ -36,10 +36,14 @@ pub enum MshError {
     Version {
         /// The version found.
         version: String,
+        /// The line that tells it.
+        line: usize,
     },
     /// A format line that makes no sense.
-    #[error("line 2: {problem}; save the file again with Gmsh")]
+    #[error("line {line}: {problem}; save the file again with Gmsh")]
     Format {
+        /// The line.
+        line: usize,
         /// What is wrong.
         problem: String,
     },
@@ -194,7 +198,7 @@ impl MshError {
     pub(super) fn place(&self) -> Option<String> {
         match self {
             Self::NotMsh { .. } => Some(Place::Line(1).to_string()),
-            Self::Version { .. } | Self::Format { .. } => Some(Place::Line(2).to_string()),
+            Self::Version { line, .. } | Self::Format { line, .. } => Some(Place::Line(*line).to_string()),
             Self::TooMany { .. } | Self::NoSection { .. } => None,
             Self::SameNode { node } => Some(format!("node {node}")),
             Self::Count { place, .. }
@@ -231,15 +235,16 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     }
     // Version 1 has no section for the format.
     if begins == b"$NOD" {
-        return Err(MshError::Version { version: "1".to_owned() }.into());
+        return Err(MshError::Version { version: "1".to_owned(), line: words.line() }.into());
     }
     if begins != b"$MeshFormat" {
         return Err(MshError::NotMsh { begins: shown(begins) }.into());
     }
     let [name, encoding, size] = [words.next(), words.next(), words.next()].map(Option::unwrap_or_default);
-    let version = version(name)?;
+    let line = words.line();
+    let version = version(name, line)?;
     if size != b"8" {
-        return Err(format_error(format!("numbers of {} bytes are not read, only of 8", shown(size))).into());
+        return Err(format_error(line, format!("numbers of {} bytes are not read, only of 8", shown(size))).into());
     }
     let name = shown(name);
     match encoding {
@@ -248,19 +253,19 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
             let (values, order) = binary(source.bytes, words)?;
             body(values, version, source.limits, Notes::new(format!("MSH {name}, binary, {order}")))
         }
-        other => Err(format_error(format!("\"{}\" is neither 0 (ASCII) nor 1 (binary)", shown(other))).into()),
+        other => Err(format_error(line, format!("\"{}\" is neither 0 (ASCII) nor 1 (binary)", shown(other))).into()),
     }
 }
 
-fn format_error(problem: String) -> MshError {
-    MshError::Format { problem }
+fn format_error(line: usize, problem: String) -> MshError {
+    MshError::Format { line, problem }
 }
 
-fn version(name: &[u8]) -> Result<Version, MshError> {
+fn version(name: &[u8], line: usize) -> Result<Version, MshError> {
     match float(name) {
         Some(number) if (2.0..=2.2).contains(&number) => Ok(Version::Two),
         Some(4.1) => Ok(Version::Four),
-        _ => Err(MshError::Version { version: shown(name) }),
+        _ => Err(MshError::Version { version: shown(name), line }),
     }
 }
 
@@ -271,7 +276,7 @@ fn binary<'a>(file: &'a [u8], words: Words<'a>) -> Result<(Binary<'a>, &'static 
     match values.int() {
         Ok(1) => Ok((values, "little-endian")),
         Ok(0x0100_0000) => Ok((Binary { big: true, ..values }, "big-endian")),
-        _ => Err(format_error("the number 1 does not follow, which tells the order of bytes".to_owned())),
+        _ => Err(format_error(words.line(), "the number 1 does not follow, which tells the order of bytes".to_owned())),
     }
 }
 

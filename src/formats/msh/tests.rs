@@ -289,6 +289,8 @@ fn comments_may_come_first_and_versions_are_numbers() {
     }
     assert!(matches!(error(b"$Comments\n1 2\n"), MshError::Truncated { .. }));
     let text = String::from_utf8(file(Ascii)).expect("text");
+    let late = error(format!("$Comments\n\n$EndComments\n{}", text.replace("2.2", "4.0")).as_bytes());
+    assert_eq!(late.place().as_deref(), Some("line 5"));
     for version in ["2", "2.10", "2.1999999999999997"] {
         assert!(content(text.replace("2.2", version).as_bytes()).is_ok(), "{version}");
     }
@@ -306,7 +308,7 @@ fn broken_files_are_refused_with_code_and_place() {
         (two.replace("$Mesh", "Mesh"), Code::Malformed, Some("line 1"), "no MSH"),
         (two.replace("2.2", "1"), Code::UnsupportedFormat, Some("line 2"), "-format msh41"),
         (two.replace("2.2", "4.0"), Code::UnsupportedFormat, Some("line 2"), "4.0"),
-        ("$NOD\n1\n1 0 0 0\n".to_owned(), Code::UnsupportedFormat, Some("line 2"), "version 1"),
+        ("$NOD\n1\n1 0 0 0\n".to_owned(), Code::UnsupportedFormat, Some("line 1"), "version 1"),
         (two.replace("0 8", "2 8"), Code::Malformed, Some("line 2"), "neither 0"),
         (two.replace("0 8", "0 4"), Code::Malformed, Some("line 2"), "4 bytes"),
         (two.replace("0 8", "1 8"), Code::Malformed, Some("line 2"), "order of bytes"),
