@@ -291,12 +291,16 @@ mod tests {
     #[test]
     fn what_no_reader_reads_is_told_by_name() {
         let utf16: Vec<u8> = "\u{feff}v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
-        let rows: [(&[u8], &str); 5] = [
+        let rows: [(&[u8], &str); 9] = [
             (&utf16, "UTF-16"),
             (b"\xfe\xff\0v\0 ", "UTF-16"),
             (b"\x1f\x8b\x08\0\0", "gzip"),
             (b"PK\x03\x04\x14\0", "zip"),
             (b"\n<!DOCTYPE html>\n<html>", "web page"),
+            (b"(0 \"GAMBIT to Fluent File\")\n", "Fluent"),
+            (b"MeshVersionFormatted 2\n", "MEDIT"),
+            (b"OFF\n3 1 0\n", "OFF"),
+            (b"ISO-10303-21;\n", "STEP"),
         ];
         for (bytes, what) in rows {
             for format in [Format::Stl, Format::Obj, Format::Ply, Format::Gltf, Format::Vtu, Format::Msh] {

@@ -29,6 +29,9 @@ pub(super) fn sniff(bytes: &[u8]) -> Option<Format> {
 /// The mark that some editors put before text in UTF-8.
 pub(super) const MARK: &[u8] = b"\xef\xbb\xbf";
 
+/// What to do with a mesh in another format.
+const CONVERT: &str = "convert it to one of those that planish reads, by Gmsh, MeshLab or meshio";
+
 /// What a file is that no reader reads, and what to do, where the first bytes say so.
 pub(super) fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     let head = &bytes[..bytes.len().min(FAR)];
@@ -37,6 +40,12 @@ pub(super) fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some(("text in UTF-16", "save it as plain text (ASCII or UTF-8)")),
         [0x1f, 0x8b, 8, ..] => Some(("compressed by gzip", "unpack it first")),
         [b'P', b'K', 3, 4, ..] => Some(("a zip archive", "unpack it first")),
+        [b'(', b'0' | b'1', b' ', ..] => Some(("a mesh of ANSYS Fluent", CONVERT)),
+        _ if page.starts_with(b"meshversionformatted") => Some(("a mesh of MEDIT (.mesh)", CONVERT)),
+        _ if page.starts_with(b"off") && is_word(&page, "off") => Some(("a mesh in the format OFF", CONVERT)),
+        _ if page.starts_with(b"iso-10303-21") => {
+            Some(("a STEP file and no mesh", "mesh it first, with Gmsh for example"))
+        }
         _ if page.starts_with(b"<!doctype html") || page.starts_with(b"<html") => {
             Some(("a web page and no mesh", "download the file itself again"))
         }
