@@ -211,10 +211,14 @@ impl std::fmt::Display for Format {
 /// The refusal.
 pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Reason> {
     read(format, source).map_err(|error| {
-        let (format, mut reason) = (sniff::sniff(source.bytes).unwrap_or(format), error.reason());
-        let begins_with_place = reason.place.as_ref().is_some_and(|place| reason.message.starts_with(place));
-        let separator = if begins_with_place { "," } else { ":" };
-        reason.message = format!("{format}{separator} {}", reason.message);
+        let mut reason = error.reason();
+        // Those are in no format.
+        if !matches!(error, ReadError::Empty | ReadError::Foreign { .. }) {
+            let format = sniff::sniff(source.bytes).unwrap_or(format);
+            let begins_with_place = reason.place.as_ref().is_some_and(|place| reason.message.starts_with(place));
+            let separator = if begins_with_place { "," } else { ":" };
+            reason.message = format!("{format}{separator} {}", reason.message);
+        }
         reason
     })
 }
