@@ -5,7 +5,7 @@
 //! turn left can lie in there; these stand in a [`Tree`], so that few of them are looked at. Neighbours of an ear wait for
 //! the next round, which keeps the triangles small.
 //!
-//! A polygon of n corners costs [`LOOKS`] n looks at most: about a second for a million corners. When the looks
+//! A polygon of n corners costs [`LOOKS`] n looks at most: some seconds for a million corners. When the looks
 //! are used up, what is left is cut up unseen, and may fold; so may polygons that cross themselves. Of both it is told
 //! that they are doubtful.
 
