@@ -16,7 +16,14 @@ pub struct TriangleSoup {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SoupError {
     /// There is no triangle.
-    #[error("the file holds no triangle ({points} points); export the surface as triangles")]
+    #[error(
+        "the file holds no triangle ({points} points); {}",
+        if *points > 0 {
+            "a cloud of points must be made a surface first, with MeshLab for example; a surface must be exported as triangles"
+        } else {
+            "export the surface as triangles"
+        }
+    )]
     NoTriangles {
         /// How many points there were.
         points: usize,

@@ -15,7 +15,7 @@ use pipeline::space::{Vec3, cross, dot, sub};
 use tree::Tree;
 
 /// Looks per corner of a polygon, at most.
-const LOOKS: usize = 300;
+const LOOKS: usize = 150;
 
 /// Cuts the polygon with these corner indices, all of which must be in range, into triangles. Where there is no ear, a
 /// corner is cut off all the same, so that n corners always give n - 2 triangles. Whether they are doubtful.

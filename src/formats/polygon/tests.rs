@@ -139,7 +139,7 @@ fn polygons_of_many_corners_take_few_looks_for_each() {
     ];
     for (shape, points) in simple {
         let (looks, is_doubtful) = looks(&points);
-        assert!(looks < LOOKS / 3 && !is_doubtful, "{shape}: {looks}");
+        assert!(looks < LOOKS / 2 && !is_doubtful, "{shape}: {looks}");
     }
     let (crossing, is_doubtful) = looks(&noise(n));
     assert!(crossing <= LOOKS + 1 && is_doubtful, "{crossing}");
