@@ -1,0 +1,147 @@
+use super::*;
+
+use crate::formats::{Limits, Nothing};
+
+fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
+    limited(bytes, &Limits::default())
+}
+
+fn limited(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, ReadError> {
+    super::read(&Source { bytes, limits, beside: &Nothing }).map(|content| content.soup)
+}
+
+fn facet(x: &str) -> String {
+    format!("facet normal 0 0 1\nouter loop\nvertex {x} 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n")
+}
+
+fn binary_file(header: &[u8], declared: u32, triangles: &[[f32; 9]]) -> Vec<u8> {
+    let mut bytes = vec![0; 80];
+    bytes[..header.len()].copy_from_slice(header);
+    bytes.extend(declared.to_le_bytes());
+    for t in triangles {
+        bytes.extend([0; 12]);
+        t.iter().for_each(|c| bytes.extend(c.to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+fn error(bytes: &[u8]) -> StlError {
+    match read(bytes) {
+        Err(ReadError::Stl(e)) => e,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn all_solids_are_read_in_any_case_and_after_blanks() {
+    let file = format!("  \n\tSOLID one\n{}ENDSOLID one\nsolid two\n{}endsolid", facet("0").to_uppercase(), facet("2"));
+    let soup = read(file.as_bytes()).expect("two solids");
+    assert_eq!((soup.triangles().len(), soup.points()[3]), (2, [2.0, 0.0, 0.0]));
+    type Layout = fn(&str) -> String;
+    let layouts: [(&str, Layout); 4] = [
+        ("on one line", |f| f.replace('\n', " ")),
+        ("with carriage returns", |f| f.replace('\n', "\r")),
+        ("with a byte order mark", |f| format!("\u{feff}{f}")),
+        ("with colours", |f| f.replace("outer", "color 0.5 0.5 1\nouter")),
+    ];
+    for (how, layout) in layouts {
+        let file = layout(&format!("solid part of facets\n{0}{0}endsolid part\n", facet("0")));
+        let soup = read(file.as_bytes()).unwrap_or_else(|e| panic!("{how}: {e}"));
+        assert_eq!(soup.triangles().len(), 2, "{how}");
+    }
+    let windows = format!("solid\r\n{}endsolid\r\n", facet("0").replace('\n', "\r\n"));
+    assert_eq!(read(windows.as_bytes()).expect("line ends").triangles().len(), 1);
+}
+
+#[test]
+fn binary_files_may_begin_with_solid() {
+    for header in [&b""[..], b"solid but binary", b"solid\nfacet normal"] {
+        let soup = read(&binary_file(header, 2, &[TRIANGLE; 2])).expect("binary");
+        assert_eq!((soup.triangles().len(), soup.points()[1]), (2, [1.0, 0.0, 0.0]));
+    }
+}
+
+#[test]
+fn count_and_size_must_agree() {
+    let file = binary_file(b"", 3, &[TRIANGLE; 2]);
+    assert_eq!(error(&file), StlError::Count { declared: 3, needed: 234, size: 184, room: 2 });
+    assert!(matches!(error(&file[..100]), StlError::Count { room: 0, .. }));
+    let longer = [binary_file(b"", 1, &[TRIANGLE]), vec![0; 7]].concat();
+    assert!(matches!(error(&longer), StlError::Excess { declared: 1, size: 141, .. }));
+    let named = binary_file(b"solid part", 3, &[TRIANGLE; 2]);
+    assert!(matches!(error(&named), StlError::Count { .. }), "binary, though it begins with solid");
+    assert_eq!(error(b"abc"), StlError::Short { size: 3 });
+}
+
+#[test]
+fn too_many_triangles_are_refused_by_the_name_of_the_setting() {
+    let limits = Limits { elements: 2, ..Limits::default() };
+    let text = |facets: usize| format!("solid\n{}endsolid", facet("0").repeat(facets)).into_bytes();
+    for (fits, more) in [(binary_file(b"", 2, &[TRIANGLE; 2]), binary_file(b"", 3, &[TRIANGLE; 3])), (text(2), text(3))]
+    {
+        assert!(limited(&fits, &limits).is_ok());
+        let reason = limited(&more, &limits).expect_err("three triangles").reason();
+        assert!(reason.code == Code::TooLarge && reason.message.contains("3 triangles"), "{reason:?}");
+        assert!(reason.message.contains("`elements` in the table [limits] of planish.toml"), "{reason:?}");
+    }
+}
+
+#[test]
+fn broken_numbers_are_named_with_their_place() {
+    let mut bad = TRIANGLE;
+    bad[4] = f32::NAN;
+    assert!(matches!(
+        error(&binary_file(b"", 2, &[TRIANGLE, bad])),
+        StlError::BinaryNotFinite { triangle: 1, byte: 134, .. }
+    ));
+    let ascii = |x| error(format!("solid\n{}endsolid", facet(x)).as_bytes());
+    assert_eq!(ascii("inf"), StlError::AsciiNotFinite { line: 4, value: "inf".to_owned() });
+    assert!(matches!(ascii("1,5"), StlError::Syntax { line: 4, .. }));
+    assert!(matches!(ascii("1 2"), StlError::Syntax { line: 4, .. }));
+}
+
+#[test]
+fn numbers_that_are_none_are_passed_over_in_normals_only() {
+    for broken in ["nan", "-nan", "-nan(ind)", "-1.#IND", "1.#QNAN00e+000", "1.#INF"] {
+        let normal = format!("normal {broken} {broken} {broken}");
+        let file = |facet: String| format!("solid\n{facet}endsolid").into_bytes();
+        assert!(read(&file(facet("0").replace("normal 0 0 1", &normal))).is_ok(), "{broken}");
+        let found = error(&file(facet(broken)));
+        assert_eq!(found, StlError::AsciiNotFinite { line: 4, value: broken.to_owned() });
+    }
+    assert!(read(b"solid\nfacet normal a b c").is_err());
+}
+
+#[test]
+fn zeros_may_fill_the_end_of_text() {
+    for facets in [1, 30] {
+        let text = format!("solid\n{}endsolid\n", facet("0").repeat(facets)).into_bytes();
+        for filling in [&[0; 40][..], &[0x1a], b"\x1a\0\0"] {
+            let soup = read(&[&text, filling].concat()).expect("filled up");
+            assert_eq!(soup.triangles().len(), facets);
+        }
+    }
+}
+
+#[test]
+fn text_of_another_kind_is_told() {
+    let found = error(format!("# by hand\nsolid\n{}endsolid\n", facet("0")).as_bytes());
+    let StlError::NoSolid { begins } = &found else { panic!("{found}") };
+    assert!(begins.starts_with("# by hand"));
+    assert_eq!((found.code(), found.place().as_deref()), (Code::Malformed, Some("line 1")));
+}
+
+#[test]
+fn cut_off_and_garbled_files_are_refused() {
+    let whole = format!("solid\n{}endsolid", facet("0"));
+    for end in 6..whole.len() - 8 {
+        assert!(read(&whole.as_bytes()[..end]).is_err(), "cut at {end}");
+    }
+    assert!(matches!(error(b"solid\nvertex 0 0 0\nendsolid"), StlError::Syntax { line: 2, .. }));
+    assert!(matches!(error(b"\n\nsolid\n\nfacet normal 0 0 1 nonsense"), StlError::Syntax { line: 5, .. }));
+    assert!(matches!(read(b"solid\nendsolid"), Err(ReadError::Soup(_))), "no triangles");
+    assert!(matches!(read(&binary_file(b"", 0, &[])), Err(ReadError::Soup(_))), "no triangles");
+}
