@@ -69,6 +69,30 @@ impl Limits {
     }
 }
 
+/// There are more elements than may be.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{count} {what} exceed the limit of {limit}; split the file, or raise `elements` in the table [limits] of planish.toml"
+)]
+pub struct TooMany {
+    /// What there is too much of.
+    pub what: String,
+    /// How many there are, so far at least.
+    pub count: u64,
+    /// How many may be.
+    pub limit: u64,
+}
+
+impl TooMany {
+    /// Refuses more than `limit`.
+    ///
+    /// # Errors
+    /// This one.
+    pub fn check(what: &str, count: u64, limit: u64) -> Result<(), Self> {
+        if count <= limit { Ok(()) } else { Err(Self { what: what.to_owned(), count, limit }) }
+    }
+}
+
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Content {

@@ -17,7 +17,7 @@ mod vtk;
 mod words;
 
 use crate::outcome::{Code, Reason};
-pub use content::{Beside, Content, Limits, Notes, Nothing, Source};
+pub use content::{Beside, Content, Limits, Notes, Nothing, Source, TooMany};
 use pipeline::mesh::SoupError;
 use std::path::Path;
 pub use vtk::{vtm, vtp, vtu};

@@ -9,6 +9,14 @@ pub enum Place {
     Byte(usize),
 }
 
+impl Place {
+    /// The line of the byte at `at`.
+    pub(super) fn line_of(bytes: &[u8], at: usize) -> Self {
+        let before = &bytes[..at.min(bytes.len())];
+        Self::Line(1 + before.iter().filter(|b| **b == b'\n').count())
+    }
+}
+
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {

@@ -14,7 +14,7 @@ mod values;
 
 use super::place::{Place, shown};
 use super::words::{Words, float};
-use super::{Content, Limits, Notes, ReadError, Source};
+use super::{Content, Limits, Notes, ReadError, Source, TooMany};
 use crate::outcome::Code;
 use nodes::Nodes;
 use surface::Surface;
@@ -76,17 +76,8 @@ pub enum MshError {
         place: Place,
     },
     /// There are more than may be.
-    #[error(
-        "{count} {what} exceed the limit of {limit}; split the file, or raise `elements` in the table [limits] of planish.toml"
-    )]
-    TooMany {
-        /// Nodes, elements or triangles.
-        what: &'static str,
-        /// How many there are.
-        count: u64,
-        /// How many may be.
-        limit: u64,
-    },
+    #[error(transparent)]
+    TooMany(#[from] TooMany),
     /// The file ends in the middle of a section.
     #[error(
         "{place}: the file ends in section ${section}; it was cut off or a number in it is wrong: copy or save it again"
@@ -188,7 +179,7 @@ impl MshError {
         match self {
             Self::Count { .. } | Self::Sum { .. } | Self::Truncated { .. } => Code::CountMismatch,
             Self::Short { .. } | Self::NoEnd { .. } => Code::CountMismatch,
-            Self::TooMany { .. } => Code::TooLarge,
+            Self::TooMany(_) => Code::TooLarge,
             Self::NotFinite { .. } => Code::NotFinite,
             Self::Version { .. } => Code::UnsupportedFormat,
             _ => Code::Malformed,
@@ -199,7 +190,7 @@ impl MshError {
         match self {
             Self::NotMsh { .. } => Some(Place::Line(1).to_string()),
             Self::Version { line, .. } | Self::Format { line, .. } => Some(Place::Line(*line).to_string()),
-            Self::TooMany { .. } | Self::NoSection { .. } => None,
+            Self::TooMany(_) | Self::NoSection { .. } => None,
             Self::SameNode { node } => Some(format!("node {node}")),
             Self::Count { place, .. }
             | Self::Sum { place, .. }

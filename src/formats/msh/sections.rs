@@ -6,7 +6,7 @@ use super::plain::Layout;
 use super::shapes::{Kind, Shape};
 use super::surface::Surface;
 use super::values::{Fault, Values, number};
-use crate::formats::Limits;
+use crate::formats::{Limits, TooMany};
 use pipeline::space::Vec3;
 
 /// Checks that so many records can be there, of so many bytes each at least.
@@ -15,7 +15,7 @@ fn fits<'a, V: Values<'a>>(values: &V, what: &'static str, count: u64, bytes: u6
     if needed > left {
         return Err(MshError::Count { what, count, needed, left, place });
     }
-    if count > most { Err(MshError::TooMany { what, count, limit: most }) } else { Ok(()) }
+    Ok(TooMany::check(what, count, most)?)
 }
 
 /// Nodes on their way.

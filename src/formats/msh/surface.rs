@@ -5,7 +5,7 @@ use super::nodes::Nodes;
 use super::shapes::{Kind, Shape};
 use super::values::{Fault, Values};
 use crate::formats::place::Place;
-use crate::formats::{Limits, Notes, polygon};
+use crate::formats::{Limits, Notes, TooMany, polygon};
 use pipeline::mesh::{SoupError, TriangleSoup};
 use std::collections::BTreeMap;
 
@@ -66,8 +66,7 @@ impl<'n> Surface<'n> {
             }
         }
         self.face(&corners[..count]);
-        let (count, limit) = (self.triangles.len() as u64, self.limits.elements);
-        if count > limit { Err(MshError::TooMany { what: "triangles", count, limit }) } else { Ok(()) }
+        Ok(TooMany::check("triangles", self.triangles.len() as u64, self.limits.elements)?)
     }
 
     /// Marks a node as one in the middle of an edge or face.

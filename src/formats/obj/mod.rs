@@ -10,7 +10,7 @@ mod statements;
 
 use super::place::shown;
 use super::words::{float, integer};
-use super::{Content, Limits, Notes, ReadError, Source, polygon};
+use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
 use pipeline::mesh::TriangleSoup;
 use pipeline::space::Vec3;
@@ -48,17 +48,8 @@ pub enum ObjError {
         text: String,
     },
     /// There are more than may be.
-    #[error(
-        "{count} {what} exceed the limit of {limit}; split the file, or raise `elements` in the table [limits] of planish.toml"
-    )]
-    TooMany {
-        /// Vertices or triangles.
-        what: &'static str,
-        /// How many there are, so far at least.
-        count: u64,
-        /// How many may be.
-        limit: u64,
-    },
+    #[error(transparent)]
+    TooMany(#[from] TooMany),
     /// The library found an error that the search before it does not.
     #[error("the file cannot be read as OBJ ({problem}); export it again")]
     Library {
@@ -71,7 +62,7 @@ impl ObjError {
     pub(super) fn code(&self) -> Code {
         match self {
             Self::NotFinite { .. } => Code::NotFinite,
-            Self::TooMany { .. } => Code::TooLarge,
+            Self::TooMany(_) => Code::TooLarge,
             Self::OutOfRange { .. } | Self::Syntax { .. } | Self::Library { .. } => Code::Malformed,
         }
     }
@@ -81,7 +72,7 @@ impl ObjError {
             Self::NotFinite { line, .. } | Self::OutOfRange { line, .. } | Self::Syntax { line, .. } => {
                 Some(format!("line {line}"))
             }
-            Self::TooMany { .. } | Self::Library { .. } => None,
+            Self::TooMany(_) | Self::Library { .. } => None,
         }
     }
 }
@@ -178,7 +169,7 @@ impl Geometry {
 /// Finds what the library would refuse without telling the line, and what is too much.
 fn check(statements: &Statements, limits: &Limits) -> Result<Geometry, ObjError> {
     let vertices = statements.clone().filter(|s| s.kind == Kind::Vertex).count();
-    few_enough("vertices", vertices, limits)?;
+    TooMany::check("vertices", vertices as u64, limits.elements)?;
     let mut geometry = Geometry { points: Vec::with_capacity(vertices), first_used: Vec::new(), triangles: 0 };
     let mut used = vec![false; vertices];
     for statement in statements.clone() {
@@ -186,16 +177,11 @@ fn check(statements: &Statements, limits: &Limits) -> Result<Geometry, ObjError>
             Kind::Vertex => geometry.points.push(point(&statement)?),
             Kind::Face => {
                 geometry.face(&statement, &mut used)?;
-                few_enough("triangles", geometry.triangles, limits)?;
+                TooMany::check("triangles", geometry.triangles as u64, limits.elements)?;
             }
         }
     }
     Ok(geometry)
-}
-
-fn few_enough(what: &'static str, count: usize, limits: &Limits) -> Result<(), ObjError> {
-    let (count, limit) = (count as u64, limits.elements);
-    if count <= limit { Ok(()) } else { Err(ObjError::TooMany { what, count, limit }) }
 }
 
 fn syntax(statement: &Statement) -> ObjError {

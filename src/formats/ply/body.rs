@@ -5,7 +5,7 @@ use super::binary::Plain;
 use super::header::{Element, Header, Property};
 use super::values::{Bad, Values};
 use crate::formats::place::shown;
-use crate::formats::{Limits, Notes, polygon};
+use crate::formats::{Limits, Notes, TooMany, polygon};
 use pipeline::space::Vec3;
 
 /// Names of the list of corners.
@@ -71,9 +71,7 @@ impl<'h> Body<'h> {
                 .and_then(|l| l.checked_sub(needed))
                 .map(|l| l.saturating_sub(1))
                 .ok_or(PlyError::Count { element: name.clone(), count, needed, left, line })?;
-            if count > self.limits.elements {
-                return Err(PlyError::TooMany { what: format!("{name} elements"), count, limit: self.limits.elements });
-            }
+            TooMany::check(&format!("{name} elements"), count, self.limits.elements)?;
         }
         Ok(())
     }
@@ -114,9 +112,7 @@ impl<'h> Body<'h> {
     }
 
     fn few_enough(&self) -> Result<(), PlyError> {
-        let (count, limit) = (self.triangles.len() as u64, self.limits.elements);
-        let error = || PlyError::TooMany { what: "triangles".to_owned(), count, limit };
-        (count <= limit).then_some(()).ok_or_else(error)
+        Ok(TooMany::check("triangles", self.triangles.len() as u64, self.limits.elements)?)
     }
 
     /// Reads a record: the corners that it lists.

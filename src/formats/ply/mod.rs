@@ -12,7 +12,7 @@ mod values;
 
 use super::place::Place;
 use super::words::Words;
-use super::{Content, Notes, ReadError, Source};
+use super::{Content, Notes, ReadError, Source, TooMany};
 use crate::outcome::Code;
 use binary::Binary;
 use body::Body;
@@ -77,17 +77,8 @@ pub enum PlyError {
         line: usize,
     },
     /// There are more than may be.
-    #[error(
-        "{count} {what} exceed the limit of {limit}; split the file, or raise `elements` in the table [limits] of planish.toml"
-    )]
-    TooMany {
-        /// What there is too much of.
-        what: String,
-        /// How many there are.
-        count: u64,
-        /// How many may be.
-        limit: u64,
-    },
+    #[error(transparent)]
+    TooMany(#[from] TooMany),
     /// The file ends in the middle.
     #[error(
         "{place}: the file ends in {element} {number} (from 0) of {count} that its header declares; it was cut off or its header is wrong: copy or export it again"
@@ -144,7 +135,7 @@ impl PlyError {
             Self::NotPly { .. } | Self::Header { .. } | Self::HeaderEnds { .. } => Code::Malformed,
             Self::NoElement | Self::NoProperty { .. } | Self::Value { .. } => Code::Malformed,
             Self::Count { .. } | Self::Truncated { .. } | Self::Trailing { .. } => Code::CountMismatch,
-            Self::TooMany { .. } => Code::TooLarge,
+            Self::TooMany(_) => Code::TooLarge,
             Self::NotFinite { .. } => Code::NotFinite,
         }
     }
@@ -152,7 +143,7 @@ impl PlyError {
     pub(super) fn place(&self) -> Option<String> {
         match self {
             Self::NotPly { .. } => Some(Place::Line(1).to_string()),
-            Self::NoElement | Self::TooMany { .. } => None,
+            Self::NoElement | Self::TooMany(_) => None,
             Self::Header { line, .. }
             | Self::HeaderEnds { line, .. }
             | Self::NoProperty { line, .. }

@@ -5,7 +5,8 @@
 //! after any blanks, and text follows. ASCII files may hold several solids; all of them are read. Words count, not
 //! lines: a facet may stand on one line.
 
-use super::{Content, Notes, ReadError, Source};
+use super::place::shown;
+use super::{Content, Notes, ReadError, Source, TooMany};
 use crate::outcome::Code;
 use pipeline::mesh::TriangleSoup;
 
@@ -61,15 +62,8 @@ pub enum StlError {
         room: usize,
     },
     /// There are more triangles than may be.
-    #[error(
-        "{count} triangles exceed the limit of {limit}; split the file, or raise `elements` in the table [limits] of planish.toml"
-    )]
-    TooMany {
-        /// How many there are, so far at least.
-        count: u64,
-        /// How many may be.
-        limit: u64,
-    },
+    #[error(transparent)]
+    TooMany(#[from] TooMany),
     /// A coordinate of a binary file is not a number, or infinite.
     #[error("triangle {triangle} has the coordinate {value}; repair the exporting model")]
     BinaryNotFinite {
@@ -108,7 +102,7 @@ impl StlError {
     pub(super) fn code(&self) -> Code {
         match self {
             Self::Count { .. } | Self::Excess { .. } => Code::CountMismatch,
-            Self::TooMany { .. } => Code::TooLarge,
+            Self::TooMany(_) => Code::TooLarge,
             Self::BinaryNotFinite { .. } | Self::AsciiNotFinite { .. } => Code::NotFinite,
             Self::Short { .. } | Self::NoSolid { .. } => Code::Malformed,
             Self::Syntax { .. } | Self::Truncated { .. } => Code::Malformed,
@@ -120,7 +114,7 @@ impl StlError {
             Self::Short { size } => format!("byte {size}"),
             Self::NoSolid { .. } => "line 1".to_owned(),
             Self::Count { .. } | Self::Excess { .. } => "byte 80".to_owned(),
-            Self::TooMany { .. } => return None,
+            Self::TooMany(_) => return None,
             Self::BinaryNotFinite { byte, .. } => format!("byte {byte}"),
             Self::AsciiNotFinite { line, .. } | Self::Syntax { line, .. } | Self::Truncated { line } => {
                 format!("line {line}")
@@ -136,7 +130,7 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let size_fits = declared.is_some_and(|n| needed(n) == bytes.len() as u64);
     let mut notes = Notes::new(if size_fits { "STL, binary" } else { "STL, ASCII" });
     let points = if size_fits {
-        few_enough(declared.unwrap_or(0).into(), limit)?;
+        TooMany::check("triangles", declared.unwrap_or(0).into(), limit).map_err(StlError::from)?;
         binary(&bytes[HEADER..])?
     } else if begins_with_solid(unfilled(bytes)) {
         ascii(unfilled(bytes), limit, &mut notes)?
@@ -145,10 +139,6 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     };
     let triangles = (0..points.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     Ok(Content { soup: TriangleSoup::new(points, triangles)?, notes })
-}
-
-fn few_enough(count: u64, limit: u64) -> Result<(), StlError> {
-    if count <= limit { Ok(()) } else { Err(StlError::TooMany { count, limit }) }
 }
 
 fn declared(bytes: &[u8]) -> Option<u32> {
@@ -286,7 +276,7 @@ fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Vec<[f64; 3]>, S
                 words.name();
             }
             (b"facet", None) if in_solid => {
-                few_enough(points.len() as u64 / 3 + 1, limit)?;
+                TooMany::check("triangles", points.len() as u64 / 3 + 1, limit)?;
                 corners = Some(0);
             }
             (b"vertex", Some(n)) if n < 3 => {
@@ -344,11 +334,6 @@ fn vertex(words: &mut Words) -> Result<[f64; 3], StlError> {
         }
         _ => Ok(point),
     }
-}
-
-/// A word of the file as it may be shown: short, printable.
-fn shown(word: &[u8]) -> String {
-    String::from_utf8_lossy(&word[..word.len().min(40)]).escape_debug().to_string()
 }
 
 #[cfg(test)]

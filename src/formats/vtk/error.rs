@@ -1,32 +1,7 @@
 //! Why bytes are no VTK file.
 
+pub(super) use crate::formats::place::{Place, shown};
 use crate::outcome::Code;
-
-/// A place in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// A line of text, from 1.
-    Line(usize),
-    /// A byte, from 0.
-    Byte(usize),
-}
-
-impl Place {
-    /// The line of this byte.
-    pub(super) fn line(bytes: &[u8], at: usize) -> Self {
-        let before = &bytes[..at.min(bytes.len())];
-        Self::Line(1 + before.iter().filter(|b| **b == b'\n').count())
-    }
-}
-
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Line(line) => write!(f, "line {line}"),
-            Self::Byte(byte) => write!(f, "byte {byte}"),
-        }
-    }
-}
 
 /// Why bytes are no VTK file, or none with a surface.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -207,9 +182,4 @@ impl VtkError {
             Self::NoSurface { .. } => None,
         }
     }
-}
-
-/// Bytes of the file as they may be shown: short, printable.
-pub(super) fn shown(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(&bytes[..bytes.len().min(40)]).escape_debug().to_string()
 }

@@ -38,7 +38,7 @@ impl<'a> Arrays<'a> {
 
     /// The place of a byte. Binary arrays hold bytes that look like ends of lines.
     pub fn place_at(&self, at: usize) -> Place {
-        if self.binary { Place::Byte(at) } else { Place::line(self.text.bytes, at) }
+        if self.binary { Place::Byte(at) } else { Place::line_of(self.text.bytes, at) }
     }
 
     /// The next keyword, in upper case, after what is told about the array before it.

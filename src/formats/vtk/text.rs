@@ -20,7 +20,7 @@ impl<'a> Text<'a> {
 
     /// The line that is read.
     pub fn place(&self) -> Place {
-        Place::line(self.bytes, self.at)
+        Place::line_of(self.bytes, self.at)
     }
 
     /// Passes over blanks and ends of lines.

@@ -76,7 +76,7 @@ impl<'a> Arrays<'a> {
     /// Adds the surface of a piece.
     fn piece(&mut self, piece: &Piece<'a>, surface: &mut Surface) -> Result<(), VtkError> {
         let bytes = self.bytes;
-        let place = || Place::line(bytes, piece.at);
+        let place = || Place::line_of(bytes, piece.at);
         if piece.points > surface.room_for_points() {
             let limit = surface.room_for_points();
             return Err(VtkError::TooLarge { place: place(), what: "points", declared: piece.points, limit });
@@ -119,7 +119,7 @@ impl<'a> Arrays<'a> {
             }
         };
         let cells = Cells { section: section.name(), types, corners: &corners, ends: &ends };
-        surface.add_cells(&cells, || Place::line(self.bytes, piece.at))
+        surface.add_cells(&cells, || Place::line_of(self.bytes, piece.at))
     }
 
     /// The first `count` points of an array.
@@ -127,7 +127,7 @@ impl<'a> Arrays<'a> {
         let name = Role::Points.name();
         if let Some(components) = array.components.filter(|c| *c != 3) {
             let problem = format!("Points have {components} components instead of 3");
-            return Err(VtkError::Syntax { place: Place::line(self.bytes, array.at), problem });
+            return Err(VtkError::Syntax { place: Place::line_of(self.bytes, array.at), problem });
         }
         if let Data::Ascii(bytes, at) = array.data {
             return Text { bytes, at }.points(&name, count);
@@ -142,7 +142,7 @@ impl<'a> Arrays<'a> {
     fn ids(&mut self, piece: &Piece<'a>, role: Role, count: u64) -> Result<Vec<u32>, VtkError> {
         let name = role.name();
         let Some(array) = piece.array(role) else {
-            let place = Place::line(self.bytes, piece.at);
+            let place = Place::line_of(self.bytes, piece.at);
             return Err(VtkError::Count { place, what: name, declared: count, there: 0 });
         };
         if let Data::Ascii(bytes, at) = array.data {
@@ -168,7 +168,7 @@ impl<'a> Arrays<'a> {
     fn place(&self, array: &Array) -> Place {
         match (array.data, self.appended) {
             (Data::Appended(offset), Some(appended)) => Place::Byte(appended.at.saturating_add(offset as usize)),
-            _ => Place::line(self.bytes, array.at),
+            _ => Place::line_of(self.bytes, array.at),
         }
     }
 
@@ -179,13 +179,13 @@ impl<'a> Arrays<'a> {
                 let data = usize::try_from(offset).ok().and_then(|offset| appended.bytes.get(offset..));
                 let Some(data) = data else {
                     let problem = format!("{name} begin at byte {offset} of {} appended bytes", appended.bytes.len());
-                    return Err(VtkError::Syntax { place: Place::line(self.bytes, array.at), problem });
+                    return Err(VtkError::Syntax { place: Place::line_of(self.bytes, array.at), problem });
                 };
                 if appended.base64 { Stream::base64(data) } else { Stream::Raw(data) }
             }
             (Data::Appended(_), None) => {
                 let problem = format!("{name} are appended, but there is no <AppendedData>: the file was cut off");
-                return Err(VtkError::Syntax { place: Place::line(self.bytes, array.at), problem });
+                return Err(VtkError::Syntax { place: Place::line_of(self.bytes, array.at), problem });
             }
             (Data::Inline(text), _) => Stream::base64_with_blanks(text),
             (Data::Ascii(..), _) => Stream::Raw(&[]),

@@ -183,7 +183,7 @@ impl<'a> Search<'a> {
     }
 
     fn place(&self) -> Place {
-        Place::line(self.bytes, self.at())
+        Place::line_of(self.bytes, self.at())
     }
 
     fn syntax(&self, problem: impl Into<String>) -> VtkError {
@@ -208,7 +208,7 @@ impl<'a> Search<'a> {
             Ok(Event::Eof) => return Err(self.syntax("the file ends before </VTKFile>: it was cut off")),
             Ok(_) => {}
             Err(error) => {
-                let place = Place::line(self.bytes, self.reader.error_position() as usize);
+                let place = Place::line_of(self.bytes, self.reader.error_position() as usize);
                 return Err(VtkError::Syntax { place, problem: format!("this is no XML ({error})") });
             }
         }
