@@ -11,6 +11,7 @@ mod obj;
 mod place;
 mod ply;
 mod polygon;
+mod scalar;
 mod sniff;
 mod stl;
 mod vtk;

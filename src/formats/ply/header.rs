@@ -2,6 +2,7 @@
 
 use super::PlyError;
 use crate::formats::place::shown;
+pub use crate::formats::scalar::Scalar;
 use crate::formats::words::Words;
 
 /// Bytes of a header, elements, and properties of each, at most.
@@ -15,21 +16,6 @@ pub enum Encoding {
     Ascii,
     Little,
     Big,
-}
-
-/// The type of a value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
 }
 
 impl Scalar {
@@ -48,16 +34,6 @@ impl Scalar {
             b"double" | b"float64" => Self::F64,
             _ => return None,
         })
-    }
-
-    /// Bytes in binary files.
-    pub fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
-        }
     }
 
     fn is_float(self) -> bool {

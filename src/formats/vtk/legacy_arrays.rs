@@ -127,7 +127,7 @@ impl<'a> Arrays<'a> {
         if !self.binary {
             return self.text.points("POINTS", count);
         }
-        let bytes = self.bytes("POINTS", count.saturating_mul(3), scalar.size())?;
+        let bytes = self.bytes("POINTS", count.saturating_mul(3), scalar.bytes())?;
         Ok(scalar.points(bytes, Order::Big))
     }
 
@@ -136,9 +136,9 @@ impl<'a> Arrays<'a> {
             return self.text.ids(what, count);
         }
         let start = self.text.at;
-        let bytes = self.bytes(what, count, scalar.size())?;
+        let bytes = self.bytes(what, count, scalar.bytes())?;
         scalar.ids(bytes, Order::Big).map_err(|bad| {
-            let place = Place::Byte(start + bad.entry * scalar.size() as usize);
+            let place = Place::Byte(start + bad.entry * scalar.size());
             VtkError::Syntax { place, problem: format!("{what} hold the number {}, which is no id", bad.value) }
         })
     }
@@ -215,7 +215,7 @@ impl<'a> Arrays<'a> {
     fn skip(&mut self, kind: &Kind, count: u64) -> Result<(), VtkError> {
         let what = "an array of FIELD";
         match kind {
-            Kind::Number(scalar) if self.binary => self.bytes(what, count, scalar.size()).map(|_| ()),
+            Kind::Number(scalar) if self.binary => self.bytes(what, count, scalar.bytes()).map(|_| ()),
             Kind::Bit if self.binary => self.bytes(what, count.div_ceil(8), 1).map(|_| ()),
             Kind::String if self.binary => (0..count).try_for_each(|_| self.skip_string()),
             Kind::Number(_) | Kind::Bit => {

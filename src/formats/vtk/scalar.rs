@@ -1,5 +1,6 @@
 //! Numbers as VTK stores them in bytes.
 
+pub(super) use crate::formats::scalar::Scalar;
 use pipeline::space::Vec3;
 
 /// In which order the bytes of a number stand.
@@ -7,21 +8,6 @@ use pipeline::space::Vec3;
 pub(super) enum Order {
     Big,
     Little,
-}
-
-/// A type of number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
 }
 
 /// Collects what `$each` makes of the numbers of a type, taken `$group` at a time.
@@ -61,7 +47,7 @@ pub(super) struct BadId {
 
 impl Scalar {
     /// The type of this name in legacy files, in lower case. An id is stored there as an int.
-    pub fn legacy(name: &[u8]) -> Option<Self> {
+    pub(super) fn legacy(name: &[u8]) -> Option<Self> {
         Some(match name {
             b"char" | b"signed_char" => Self::I8,
             b"unsigned_char" => Self::U8,
@@ -78,7 +64,7 @@ impl Scalar {
     }
 
     /// The type of this name in XML files.
-    pub fn xml(name: &str) -> Option<Self> {
+    pub(super) fn xml(name: &str) -> Option<Self> {
         Some(match name {
             "Int8" => Self::I8,
             "UInt8" => Self::U8,
@@ -95,17 +81,12 @@ impl Scalar {
     }
 
     /// Bytes of a number.
-    pub fn size(self) -> u64 {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
-        }
+    pub(super) fn bytes(self) -> u64 {
+        self.size() as u64
     }
 
     /// Triples of numbers; bytes that make no whole triple are left out.
-    pub fn points(self, bytes: &[u8], order: Order) -> Vec<Vec3> {
+    pub(super) fn points(self, bytes: &[u8], order: Order) -> Vec<Vec3> {
         macro_rules! points {
             ($type:ty) => {
                 collected!($type, 3, bytes, order, |p: [$type; 3]| p.map(|c| c as f64))
@@ -126,7 +107,7 @@ impl Scalar {
     }
 
     /// Whole numbers; bytes that make none are left out. Floating point numbers are no ids.
-    pub fn ids(self, bytes: &[u8], order: Order) -> Result<Vec<u32>, BadId> {
+    pub(super) fn ids(self, bytes: &[u8], order: Order) -> Result<Vec<u32>, BadId> {
         match self {
             Self::I8 => whole!(i8, bytes, order),
             Self::U8 => whole!(u8, bytes, order),
@@ -162,7 +143,7 @@ mod tests {
     fn whole_numbers_of_every_size_and_order_are_read() {
         for (name, scalar) in ALL {
             assert_eq!(Scalar::xml(name), Some(scalar));
-            let size = scalar.size() as usize;
+            let size = scalar.size();
             if [Scalar::F32, Scalar::F64].contains(&scalar) {
                 assert!(scalar.ids(&[0; 8], Order::Big).is_err());
                 continue;

@@ -134,8 +134,8 @@ impl<'a> Arrays<'a> {
         }
         let bytes = self.bytes_of(array, &name)?;
         let declared = count.saturating_mul(3);
-        let needed = self.at_least(array, &name, declared, bytes.len() as u64 / array.scalar.size())?;
-        Ok(array.scalar.points(&bytes[..(needed * array.scalar.size()) as usize], self.packing.order))
+        let needed = self.at_least(array, &name, declared, bytes.len() as u64 / array.scalar.bytes())?;
+        Ok(array.scalar.points(&bytes[..(needed * array.scalar.bytes()) as usize], self.packing.order))
     }
 
     /// The first `count` numbers of an array.
@@ -149,8 +149,8 @@ impl<'a> Arrays<'a> {
             return Text { bytes, at }.ids(&name, count);
         }
         let bytes = self.bytes_of(&array, &name)?;
-        let needed = self.at_least(&array, &name, count, bytes.len() as u64 / array.scalar.size())?;
-        let ids = array.scalar.ids(&bytes[..(needed * array.scalar.size()) as usize], self.packing.order);
+        let needed = self.at_least(&array, &name, count, bytes.len() as u64 / array.scalar.bytes())?;
+        let ids = array.scalar.ids(&bytes[..(needed * array.scalar.bytes()) as usize], self.packing.order);
         ids.map_err(|bad| {
             let problem = format!("number {} of {name} is {}, which is no id", bad.entry, bad.value);
             VtkError::Syntax { place: self.place(&array), problem }
