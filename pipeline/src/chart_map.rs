@@ -138,8 +138,8 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64, host: &dyn H
 /// right within a decade mostly, and saves untangling; what decides is the certified map.
 const HOPELESS: f64 = 10.0;
 
-/// Maps `chart`, a part of `mesh`, and splits it where it cannot be mapped, or would be more distorted than `settings`
-/// allow, until every part can. Ends because parts are smaller, and single triangles map.
+/// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, or would be more
+/// distorted than `settings` allow, until every part can. Ends because parts are smaller, and single triangles map.
 ///
 /// # Errors
 /// [`SplitError`].
@@ -153,6 +153,10 @@ pub fn map_or_split(
     let mut mapped = Vec::new();
     let mut waiting = vec![chart];
     while let Some(chart) = waiting.pop() {
+        if let Some(ends) = decompose::contact(mesh, &chart) {
+            waiting.extend(decompose::separate(mesh, &chart, ends, settings, host)?.into_iter().rev());
+            continue;
+        }
         let error = match map_within(&chart, order, settings.max_area_ratio, host) {
             Ok(map) => {
                 mapped.push((chart, map));

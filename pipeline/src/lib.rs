@@ -73,10 +73,12 @@ mod chart_map;
 pub mod curvature;
 pub mod decompose;
 pub mod distortion;
+pub mod evaluate;
 pub mod linear;
 pub mod quadratic;
 pub mod repair;
 pub mod seams;
+pub mod soundness;
 pub mod subdivide;
 pub mod untangle;
 

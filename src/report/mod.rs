@@ -359,6 +359,12 @@ pub struct HandOff {
     pub refined: usize,
     /// Charts that are handed over by their linear map.
     pub linear_charts: Vec<u32>,
+    /// Charts that Gmsh's MeshAdapt is asked to mesh, as their maps stretch.
+    #[serde(default)]
+    pub adapted_charts: Vec<u32>,
+    /// By how much lengths are multiplied in the atlas that remesh.geo merges; 1: that is atlas.msh.
+    #[serde(default = "unchanged")]
+    pub enlarged: f64,
     /// Nodes that were moved so that every triangle has a normal.
     pub moved_vertices: usize,
     /// Shortest distance between two seams of a chart that share no end; null where there are no two.
@@ -367,6 +373,11 @@ pub struct HandOff {
     pub warning: Option<String>,
     /// Why there is no hand-off.
     pub failure: Option<String>,
+}
+
+/// What earlier versions did to lengths.
+fn unchanged() -> f64 {
+    1.0
 }
 
 /// A file of the result.

@@ -13,7 +13,7 @@ use super::voronoi::{Cells, bisect_until, farthest_first};
 use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
 use crate::host::Host;
-use crate::id::{FaceId, HalfEdgeId};
+use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;
 use crate::union_find::UnionFind;
 
@@ -38,11 +38,56 @@ pub fn split(
     if chart.triangles().len() < 2 {
         return Ok(None);
     }
+    let cut = |dual: &Dual, limits: &Limits| {
+        let by_scale = log_scale.and_then(|s| across_protrusion(dual, s, limits));
+        by_scale.unwrap_or_else(|| halves(dual, limits))
+    };
+    pieces(mesh, chart, cut, settings, host).map(Some)
+}
+
+/// Cuts `chart`, a part of `mesh`, between two of its vertices, given by their places in the chart, into at least two
+/// charts with the same id. No triangle may have both as corners.
+///
+/// A chart whose boundary passes twice through one place in space (copies of a vertex at which sheets touch) cannot be
+/// handed to meshers, which find places in the plane by those in space.
+///
+/// # Errors
+/// As [`split`].
+pub fn separate(
+    mesh: &SurfaceMesh,
+    chart: &Chart,
+    ends: [VertexId; 2],
+    settings: &Settings,
+    host: &dyn Host,
+) -> Result<Vec<Chart>, Error> {
+    let cut = |dual: &Dual, limits: &Limits| {
+        let nearer = Cells { of: nearer_end(dual, ends), count: 2 };
+        bisect_until(dual, nearer, |groups| legal(dual, &Complex::new(dual, groups), limits)).of
+    };
+    pieces(mesh, chart, cut, settings, host)
+}
+
+/// Two vertices of a chart that are copies of one vertex of the input, if there are any.
+pub fn contact(mesh: &SurfaceMesh, chart: &Chart) -> Option<[VertexId; 2]> {
+    let welded = |(v, place): (&VertexId, u32)| (mesh.welded_vertex(*v), place);
+    let mut copies: Vec<(u32, u32)> = chart.vertices().iter().zip(0..).map(welded).collect();
+    copies.sort_unstable();
+    let twice = copies.windows(2).find(|w| w[0].0 == w[1].0)?;
+    Some([VertexId(twice[0].1), VertexId(twice[1].1)])
+}
+
+/// The charts into which `cut` labels the triangles of `chart`, with straightened seams.
+fn pieces(
+    mesh: &SurfaceMesh,
+    chart: &Chart,
+    cut: impl FnOnce(&Dual, &Limits) -> Vec<u32>,
+    settings: &Settings,
+    host: &dyn Host,
+) -> Result<Vec<Chart>, Error> {
     let part = mesh.part(chart);
     let (dual, _) = with_features(&part, settings, host)?;
     let limits = Limits::new(settings);
-    let by_scale = log_scale.and_then(|s| across_protrusion(&dual, s, &limits));
-    let labels = by_scale.unwrap_or_else(|| halves(&dual, &limits));
+    let labels = cut(&dual, &limits);
     let (cells, _) = cells(&dual, &limits)?;
     let size = dual.total_area() / cells.count as f64;
     let pieces = finish(&dual, labels, limits, settings, &cells, |_| size.sqrt())?;
@@ -53,7 +98,36 @@ pub fn split(
         faces: piece.faces.iter().map(|f| chart.faces[f.index()]).collect(),
         ..piece.clone()
     };
-    Ok(Some(pieces.charts().iter().map(on_surface).collect()))
+    Ok(pieces.charts().iter().map(on_surface).collect())
+}
+
+/// Per triangle, which of two vertices is fewer triangles away: 0 or 1. Both parts are connected, as every triangle but
+/// those at the vertices has a neighbour in its part that is nearer.
+fn nearer_end(dual: &Dual, ends: [VertexId; 2]) -> Vec<u32> {
+    let triangles = dual.mesh.triangles();
+    let mut labels = vec![u32::MAX; triangles.len()];
+    let mut front: Vec<FaceId> = Vec::new();
+    for (label, end) in (0..).zip(ends) {
+        for f in (0..triangles.len()).filter(|f| triangles[*f].contains(&end)) {
+            labels[f] = label;
+            front.push(FaceId::at(f));
+        }
+    }
+    // Breadth first: each triangle enters once.
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for face in front {
+            for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
+                let Some(other) = dual.across(h).map(HalfEdgeId::face) else { continue };
+                if labels[other.index()] == u32::MAX {
+                    labels[other.index()] = labels[face.index()];
+                    next.push(other);
+                }
+            }
+        }
+        front = next;
+    }
+    labels
 }
 
 /// Two parts of about the same size; more where these are no charts.

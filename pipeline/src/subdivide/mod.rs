@@ -4,7 +4,9 @@
 //! middle of straight edges. A curved triangle can be valid although one of the four is not: there it is refined
 //! until all are positive, decided exactly on the numbers that are kept. Where that would take too many
 //! parts (a curved triangle may be valid by a hair along a whole side) the chart is handed over by the map from which
-//! its untangling started: it is certified too, and its triangles are straight. Nodes on seams are the same numbers in
+//! its untangling started: it is certified too, and its triangles are straight. Where even its curved sides at the
+//! boundary need too many, their chords take their place, and that map is certified anew: its parts are similar to its
+//! triangles, so they turn left wherever these do. Nodes on seams are the same numbers in
 //! all charts, and a curve is exactly the sides of the triangles along it: nothing cracks or overlaps.
 //!
 //! Meshers compute normals from the numbers as written and fail where one is exactly zero: in this copy, and only
@@ -18,7 +20,7 @@ mod refine;
 
 use crate::CertifiedChart;
 use crate::atlas::Chart;
-use crate::certify::CertifiedMap;
+use crate::certify::{CertifiedMap, PlanarMap, prove};
 use crate::curvature::Principal;
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, CurveId, FaceId, VertexId};
@@ -26,6 +28,7 @@ use crate::mesh::SurfaceMesh;
 use crate::seams::SeamNetwork;
 use crate::space::Vec3;
 use nodes::Nodes;
+use std::borrow::Cow;
 
 /// The charts of a surface as linear triangulations that share the nodes on their seams.
 #[derive(Clone, Debug)]
@@ -189,30 +192,58 @@ struct Split {
     refined: usize,
 }
 
-/// Splits the triangles of all charts. A chart that needs too many parts gets its linear map, and all begins again:
-/// at most once for each chart.
+/// By which of its maps a chart is handed over, from the best to the plainest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum HandedOver {
+    /// The certified map.
+    Certified,
+    /// The map from which untangling started: straight triangles, arcs along the boundary.
+    Start,
+    /// The same with chords instead of arcs.
+    Chords,
+}
+
+/// Splits the triangles of all charts. A chart that needs too many parts gets a plainer map, and all begins again: at
+/// most twice for each chart.
 fn split(mesh: &SurfaceMesh, charts: &[Chart], maps: &[CertifiedChart], network: &SeamNetwork) -> Result<Split, Error> {
-    let mut chosen: Vec<&CertifiedMap> = maps.iter().map(|m| &m.certified).collect();
-    let mut linear: Vec<ChartId> = Vec::new();
+    let mut chosen: Vec<Cow<CertifiedMap>> = maps.iter().map(|m| Cow::Borrowed(&m.certified)).collect();
+    let mut by = vec![HandedOver::Certified; maps.len()];
     loop {
         let mut nodes = Nodes::new(mesh, network, charts);
         let mut split: Vec<LinearChart> =
             charts.iter().zip(&chosen).map(|(c, m)| quartered(mesh, c, m, &nodes)).collect();
-        let failed = match refine::refine(refine::DEPTH, mesh, charts, &chosen, &mut nodes, &mut split) {
+        let current: Vec<&CertifiedMap> = chosen.iter().map(AsRef::as_ref).collect();
+        let failed = match refine::refine(refine::DEPTH, mesh, charts, &current, &mut nodes, &mut split) {
             Ok(refined) => {
-                linear.sort_unstable();
+                let is_linear = |c: &usize| by[*c] != HandedOver::Certified;
+                let linear = (0..charts.len()).filter(is_linear).map(ChartId::at).collect();
                 return Ok(Split { nodes, charts: split, linear, refined });
             }
             Err(failed) => failed,
         };
         for inverted in failed {
-            if linear.contains(&inverted.chart) {
-                return Err(inverted.into());
-            }
-            chosen[inverted.chart.index()] = &maps[inverted.chart.index()].start;
-            linear.push(inverted.chart);
+            let chart = inverted.chart.index();
+            let start = &maps[chart].start;
+            (by[chart], chosen[chart]) = match by[chart] {
+                HandedOver::Certified => (HandedOver::Start, Cow::Borrowed(start)),
+                HandedOver::Start => (HandedOver::Chords, Cow::Owned(with_chords(start).ok_or(inverted)?)),
+                HandedOver::Chords => return Err(inverted.into()),
+            };
         }
     }
+}
+
+/// A map with every mid-edge node in the middle of its edge, certified anew; none where it is not one-to-one.
+fn with_chords(map: &CertifiedMap) -> Option<CertifiedMap> {
+    let map = map.map();
+    let mut nodes = map.nodes.clone();
+    for [a, b, c, ab, bc, ca] in &map.cells {
+        for (mid, ends) in [(ab, [a, b]), (bc, [b, c]), (ca, [c, a])] {
+            let [from, to] = ends.map(|n| map.nodes[*n as usize]);
+            nodes[*mid as usize] = from.midpoint(to);
+        }
+    }
+    prove(PlanarMap { nodes, ..map.clone() }).ok()
 }
 
 /// Refuses charts whose boundary touches itself in space: a place on it has two images in the plane.

@@ -1,14 +1,18 @@
 //! The binary form of MSH 4.1: little endian, `size_t` of eight bytes, `int` of four.
 
+use pipeline::space::Vec3;
+
 /// A file as it grows.
 pub struct Binary {
     pub bytes: Vec<u8>,
+    /// By how much lengths are multiplied: a power of two, so that nothing is rounded.
+    pub unit: f64,
 }
 
 impl Binary {
     /// A file with its `$MeshFormat`.
     pub fn new() -> Self {
-        let mut file = Self { bytes: b"$MeshFormat\n4.1 1 8\n".to_vec() };
+        let mut file = Self { bytes: b"$MeshFormat\n4.1 1 8\n".to_vec(), unit: 1.0 };
         // Readers compare this with their own 1 to know the order of bytes.
         file.int(1);
         file.bytes.extend(b"\n$EndMeshFormat\n");
@@ -35,6 +39,16 @@ impl Binary {
     /// Appends doubles.
     pub fn doubles(&mut self, values: &[f64]) {
         values.iter().for_each(|v| self.bytes.extend(v.to_le_bytes()));
+    }
+
+    /// Appends a point of space.
+    pub fn point(&mut self, point: Vec3) {
+        self.doubles(&point.map(|c| c * self.unit));
+    }
+
+    /// Appends a curvature times its direction.
+    pub fn curvature(&mut self, curvature: Vec3) {
+        self.doubles(&curvature.map(|c| c / self.unit));
     }
 
     /// Appends the tag of the entity at `index`. Tags begin with 1.

@@ -1,12 +1,12 @@
 //! `remesh.geo`: a script that merges the atlas, sets sizes, and tells its reader what to change.
 
-use super::ATLAS;
+use super::{ATLAS, ENLARGED};
 
 /// From about this many triangles on, the script asks for the faster algorithm.
 const MANY: u32 = 20_000;
 
 /// What the script asks for and tells.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Script {
     /// The edge length, in the unit of the input.
     pub size: f64,
@@ -16,11 +16,23 @@ pub struct Script {
     pub surfaces: usize,
     /// How many curves.
     pub curves: usize,
+    /// By which algorithms.
+    pub algorithms: Algorithms,
+}
+
+/// The algorithms that the script asks for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Algorithms {
+    /// The surfaces, counted from 0, that MeshAdapt must mesh; the others fare better with Frontal-Delaunay.
+    pub adapted: Vec<usize>,
+    /// By how much all lengths are multiplied in the file that is merged, a power of two; 1: the atlas itself is merged.
+    pub enlarged: f64,
 }
 
 /// The bytes of `remesh.geo`.
 pub fn remesh(script: &Script) -> Vec<u8> {
-    let Script { size, area, surfaces, curves } = script;
+    let Script { size, area, surfaces, curves, algorithms } = script;
+    let factor = algorithms.enlarged;
     format!(
         "// Remesh this surface through its certified maps:
 //
@@ -33,15 +45,14 @@ pub fn remesh(script: &Script) -> Vec<u8> {
 // Do not call CreateGeometry or ClassifySurfaces: they would replace the certified maps by other ones.
 
 SetFactory(\"Built-in\");
-Merge \"{ATLAS}\";
-
+{merge}
 // The edge length, in the unit of the input: change this number, or give -setnumber size H.
 DefineConstant[ size = {{{size}, Name \"Edge length\"}} ];
 
 // One size everywhere. For smaller elements where the surface bends, let Mesh.MeshSizeMin be smaller and uncomment
 // the line with the number of elements per full turn.
-Mesh.MeshSizeMin = size;
-Mesh.MeshSizeMax = size;
+Mesh.MeshSizeMin = size{times};
+Mesh.MeshSizeMax = size{times};
 Mesh.MeshSizeExtendFromBoundary = 0;
 Mesh.MeshSizeFromPoints = 0;
 // Mesh.MeshSizeFromCurvature = 20;
@@ -53,24 +64,79 @@ If(2.31 * {area} / size^2 < {MANY})
 Else
   Mesh.Algorithm = 5;
 EndIf
-// One triangle that leans more than 90 degrees from the input's would make Gmsh begin again with a far slower one.
+{adapted}// One triangle that leans more than 90 degrees from the input's would make Gmsh begin again with a far slower one.
 Mesh.AlgorithmSwitchOnFailure = 0;
 // Mesh.RecombineAll = 1; // quadrangles
-// Mesh.ElementOrder = 2; // curved elements
-"
+
+// Curved elements: uncomment both. Without the second, elements are inverted where the surface bends sharply.
+// Mesh.ElementOrder = 2;
+// Mesh.HighOrderOptimize = 1;
+",
+        merge = merge(factor),
+        times = if factor == 1.0 { String::new() } else { format!(" * {factor}") },
+        adapted = adapted(&algorithms.adapted),
     )
     .into_bytes()
+}
+
+/// What reads the atlas.
+fn merge(factor: f64) -> String {
+    if factor == 1.0 {
+        return format!("Merge \"{ATLAS}\";\n");
+    }
+    format!(
+        "
+// The same atlas with all lengths {factor} times as large: MeshAdapt looks for the closest point of a surface within 0.1
+// of whatever unit, which takes minutes where that is many edges. What is written to files has the unit of the input.
+Merge \"{ENLARGED}\";
+Mesh.ScalingFactor = 1 / {factor};
+"
+    )
+}
+
+/// What asks for MeshAdapt.
+fn adapted(surfaces: &[usize]) -> String {
+    if surfaces.is_empty() {
+        return String::new();
+    }
+    let mut text = String::from(
+        "// Maps that stretch: there the algorithms above leave parts of the surface out, or make slivers. MeshAdapt does not,
+// but takes ten times as long.
+MeshAlgorithm Surface {",
+    );
+    for (i, surface) in surfaces.iter().enumerate() {
+        let separator = match i {
+            0 => "",
+            _ if i % 20 == 0 => ",\n  ",
+            _ => ", ",
+        };
+        text += &format!("{separator}{}", surface + 1);
+    }
+    text + "} = 1;\n\n"
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn script(algorithms: Algorithms) -> String {
+        let script = Script { size: 0.1 + 0.2, area: 4.5, surfaces: 2, curves: 1, algorithms };
+        String::from_utf8(remesh(&script)).expect("UTF-8")
+    }
+
     #[test]
     fn the_script_holds_the_size_in_full() {
-        let text =
-            String::from_utf8(remesh(&Script { size: 0.1 + 0.2, area: 4.5, surfaces: 2, curves: 1 })).expect("UTF-8");
+        let text = script(Algorithms { adapted: vec![], enlarged: 1.0 });
         assert!(text.contains("size = {0.30000000000000004, Name"), "{text}");
         assert!(text.contains("Merge \"atlas.msh\";"));
+        assert!(!text.contains("MeshAlgorithm") && !text.contains("ScalingFactor"), "{text}");
+    }
+
+    #[test]
+    fn surfaces_are_counted_from_one_and_lengths_are_enlarged_alike() {
+        let text = script(Algorithms { adapted: (0..22).collect(), enlarged: 1024.0 });
+        assert!(text.contains("MeshAlgorithm Surface {1, 2,") && text.contains(", 20,\n  21, 22} = 1;"), "{text}");
+        assert!(text.contains("Merge \"atlas-enlarged.msh\";\nMesh.ScalingFactor = 1 / 1024;"), "{text}");
+        assert!(text.contains("MeshSizeMax = size * 1024;"), "{text}");
     }
 }

@@ -78,7 +78,7 @@ fn nodes(out: &mut Binary, blocks: &[Block], linear: &LinearAtlas) {
         out.size(block.nodes.len());
         (1..=block.nodes.len()).for_each(|i| out.size(last + i));
         last += block.nodes.len();
-        block.nodes.iter().for_each(|n| out.doubles(&linear.points()[*n as usize]));
+        block.nodes.iter().for_each(|n| out.point(linear.points()[*n as usize]));
     }
 }
 

@@ -6,7 +6,7 @@ mod binary;
 mod geo;
 mod mesh;
 
-pub use geo::{Script, remesh};
+pub use geo::{Algorithms, Script, remesh};
 
 use binary::Binary;
 use pipeline::atlas::Chart;
@@ -17,6 +17,9 @@ use pipeline::subdivide::{LinearAtlas, LinearChart};
 
 /// The name of the atlas in a result folder, and in `remesh.geo`.
 pub const ATLAS: &str = "atlas.msh";
+
+/// The name of the atlas in a larger unit, which `remesh.geo` merges where Gmsh needs it.
+pub const ENLARGED: &str = "atlas-enlarged.msh";
 
 /// The name of the script.
 pub const REMESH: &str = "remesh.geo";
@@ -34,13 +37,22 @@ pub fn atlas(charts: &[Chart], linear: &LinearAtlas, network: &SeamNetwork) -> V
     out.bytes
 }
 
+/// The bytes of `atlas-enlarged.msh`: as [`atlas`], with all lengths multiplied by a power of two, and without the
+/// triangles of the input.
+pub fn enlarged(linear: &LinearAtlas, network: &SeamNetwork, factor: f64) -> Vec<u8> {
+    let mut out = Binary { unit: factor, ..Binary::new() };
+    out.section("Entities", |out| entities(out, linear, network));
+    out.section("Parametrizations", |out| parametrizations(out, linear));
+    out.bytes
+}
+
 fn entities(out: &mut Binary, linear: &LinearAtlas, network: &SeamNetwork) {
     for count in [network.points().len(), network.curves().len(), linear.charts().len(), 0] {
         out.size(count);
     }
     for (point, node) in point_nodes(linear, network).into_iter().enumerate() {
         out.tag(point);
-        out.doubles(&linear.points()[node as usize]);
+        out.point(linear.points()[node as usize]);
         out.size(0);
     }
     for (curve, nodes) in network.curves().iter().zip(linear.curves()) {
@@ -75,8 +87,8 @@ fn point_nodes(linear: &LinearAtlas, network: &SeamNetwork) -> Vec<u32> {
 fn bounding_box(out: &mut Binary, linear: &LinearAtlas, nodes: &[u32]) {
     let around = BoundingBox::of(nodes.iter().map(|n| linear.points()[*n as usize]));
     let around = around.unwrap_or(BoundingBox { min: [0.0; 3], max: [0.0; 3] });
-    out.doubles(&around.min);
-    out.doubles(&around.max);
+    out.point(around.min);
+    out.point(around.max);
     out.size(0);
 }
 
@@ -87,7 +99,7 @@ fn parametrizations(out: &mut Binary, linear: &LinearAtlas) {
         out.tag(index);
         out.size(nodes.len());
         for (t, node) in nodes.iter().enumerate() {
-            out.doubles(&linear.points()[*node as usize]);
+            out.point(linear.points()[*node as usize]);
             out.doubles(&[t as f64]);
         }
     }
@@ -102,10 +114,10 @@ fn surface(out: &mut Binary, linear: &LinearAtlas, chart: &LinearChart) {
     out.size(chart.triangles().len());
     for (node, uv) in chart.nodes().iter().zip(chart.uv()) {
         let [largest, smallest] = linear.curvatures()[*node as usize];
-        out.doubles(&linear.points()[*node as usize]);
+        out.point(linear.points()[*node as usize]);
         out.doubles(&uv.uv());
-        out.doubles(&largest);
-        out.doubles(&smallest);
+        out.curvature(largest);
+        out.curvature(smallest);
     }
     chart.triangles().iter().flatten().for_each(|n| out.int(*n as i32));
 }

@@ -1,0 +1,132 @@
+//! Triangles that cut through each other.
+//!
+//! Two triangles that share no node cross where a side of one passes through the inside of the other; two that share one
+//! node, where the side opposite it does. What only touches does not count, nor what is so close to it that rounding could
+//! decide: every sign is that of a volume beyond its rounding error (Shewchuk 1997, doi 10.1007/PL00009321, the
+//! filter of `orient3d`). Triangles that share a side, and those that lie in one plane, are not looked at here: in a chart
+//! the plane of its map shows them.
+
+use super::reference::Triangulation;
+use crate::evaluate::Bvh;
+use crate::space::{BoundingBox, Vec3, cross, dot, sub};
+
+/// The error of the volume of six doubles, relative to the sum of the absolute values of its terms.
+const ROUNDING: f64 = 8e-16;
+
+/// A surface is looked at around so many crossings of a mesh at most, and in so many triangles around each.
+const LOOKED_AT: usize = 2_000;
+const NEIGHBOURS: usize = 400;
+
+/// Crossings of a mesh that its surface does not have.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Crossings {
+    /// Pairs of triangles, the first of them by their numbers, and how many there are.
+    pub pairs: Vec<[u32; 2]>,
+    /// Pairs that the surface has, too.
+    pub in_surface: usize,
+}
+
+/// Finds the pairs of triangles of `mesh` that cross where no triangles of `surface` do.
+pub fn crossings(mesh: &Triangulation, surface: &Triangulation, surface_bvh: &Bvh) -> Crossings {
+    let mut pairs = Vec::new();
+    mesh.bvh().pairs(|a, b| {
+        if cross_each_other(mesh, a, b) {
+            pairs.push([a, b]);
+        }
+    });
+    let mut found = Crossings::default();
+    for (i, pair) in pairs.into_iter().enumerate() {
+        // Beyond the bound a crossing counts: it is the mesh that is suspect.
+        if i < LOOKED_AT && surface_crosses(mesh, pair, surface, surface_bvh) {
+            found.in_surface += 1;
+        } else {
+            found.pairs.push(pair);
+        }
+    }
+    found
+}
+
+/// Whether triangles of the surface cross within the boxes of two crossing triangles of the mesh.
+fn surface_crosses(mesh: &Triangulation, pair: [u32; 2], surface: &Triangulation, bvh: &Bvh) -> bool {
+    let near = pair.map(|t| {
+        let mut near = Vec::new();
+        let around = BoundingBox::of(mesh.corners(t as usize));
+        around.iter().for_each(|b| bvh.overlapping(b, |s| near.push(s)));
+        near.truncate(NEIGHBOURS);
+        near
+    });
+    near[0].iter().any(|s| near[1].iter().any(|t| s != t && cross_each_other(surface, *s, *t)))
+}
+
+/// Whether two triangles cross.
+fn cross_each_other(mesh: &Triangulation, a: u32, b: u32) -> bool {
+    let [s, t] = [a, b].map(|i| mesh.triangles[i as usize]);
+    let shared = s.iter().filter(|v| t.contains(v)).count();
+    let [p, q] = [a, b].map(|i| mesh.corners(i as usize));
+    match shared {
+        0 => (0..3).any(|k| pierces([p[k], p[(k + 1) % 3]], q) || pierces([q[k], q[(k + 1) % 3]], p)),
+        1 => {
+            let opposite = |t: &[_; 3], other: &[_; 3], p: [Vec3; 3]| {
+                let k = (0..3).find(|k| other.contains(&t[*k])).unwrap_or(0);
+                [p[(k + 1) % 3], p[(k + 2) % 3]]
+            };
+            pierces(opposite(&s, &t, p), q) || pierces(opposite(&t, &s, q), p)
+        }
+        _ => false,
+    }
+}
+
+/// Whether a segment passes through the inside of a triangle, beyond doubt.
+fn pierces([a, b]: [Vec3; 2], t: [Vec3; 3]) -> bool {
+    let ends = [volume(t[0], t[1], t[2], a), volume(t[0], t[1], t[2], b)];
+    if ends[0] * ends[1] >= 0 {
+        return false;
+    }
+    let sides = [0, 1, 2].map(|k| volume(a, b, t[k], t[(k + 1) % 3]));
+    sides == [1, 1, 1] || sides == [-1, -1, -1]
+}
+
+/// The sign of the volume of a tetrahedron; 0 where rounding could have made it.
+fn volume(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
+    let (u, v, w) = (sub(a, d), sub(b, d), sub(c, d));
+    let found = dot(u, cross(v, w));
+    let terms: f64 = (0..3)
+        .map(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            u[k].abs() * ((v[i] * w[j]).abs() + (v[j] * w[i]).abs())
+        })
+        .sum();
+    if found.abs() <= ROUNDING * terms { 0 } else { found.signum() as i8 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(triangles: &[[Vec3; 3]]) -> Triangulation {
+        let points: Vec<Vec3> = triangles.iter().flatten().copied().collect();
+        Triangulation::welded(&points, (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]))
+    }
+
+    const FLAT: [Vec3; 3] = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
+
+    #[test]
+    fn what_passes_through_crosses_and_what_touches_does_not() {
+        let none = mesh(&[]);
+        let count = |other: [Vec3; 3]| crossings(&mesh(&[FLAT, other]), &none, &none.bvh()).pairs.len();
+        assert_eq!(count([[0.5, 0.5, -1.0], [0.5, 0.5, 1.0], [5.0, 5.0, 0.0]]), 1);
+        assert_eq!(count([[0.0; 3], [0.9, 0.6, -1.0], [0.6, 0.9, 1.0]]), 1, "through a shared node");
+        assert_eq!(count([[0.0; 3], [-0.5, -0.5, -1.0], [-0.6, -0.9, 1.0]]), 0);
+        assert_eq!(count([[0.5, 0.5, 0.0], [0.5, 0.5, 1.0], [5.0, 5.0, 1.0]]), 0, "a corner on it");
+        assert_eq!(count([[0.5, 0.5, 1e-9], [0.5, 0.5, 1.0], [5.0, 5.0, 1.0]]), 0);
+        assert_eq!(count([FLAT[0], FLAT[1], [1.0, 1.0, 0.1]]), 0, "a shared side");
+    }
+
+    #[test]
+    fn what_the_surface_has_is_not_held_against_the_mesh() {
+        let through = [[0.5, 0.5, -1.0], [0.5, 0.5, 1.0], [5.0, 5.0, 0.0]];
+        let both = mesh(&[FLAT, through]);
+        let found = crossings(&both, &both, &both.bvh());
+        assert_eq!((found.pairs.len(), found.in_surface), (0, 1));
+    }
+}

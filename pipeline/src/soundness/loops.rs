@@ -1,0 +1,172 @@
+//! Are the boundary loops of a chart in the plane simple and rightly nested? Decided exactly, on the grid.
+//!
+//! With every triangle positive, such loops are all that the theorem of [`crate::certify`] asks for: the number of
+//! preimages of a point is its winding number about the loops, which is 1 inside the outer one and outside the holes,
+//! and 0 elsewhere.
+
+use crate::evaluate::Bvh;
+use crate::grid::{GridPoint, orientation};
+use crate::space::BoundingBox;
+
+/// What is wrong with loops.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrong {
+    /// Two sides cross or touch, each given by its loop and its place there.
+    Crossing([(usize, usize); 2]),
+    /// Not exactly one loop turns left; this one is given as evidence.
+    Outer(usize),
+    /// A loop lies outside the outer one, or inside another.
+    Nesting(usize),
+}
+
+/// Looks at closed polygons, each with what it bounds on its left.
+pub fn check(loops: &[Vec<GridPoint>]) -> Option<Wrong> {
+    if let Some(pair) = crossing(loops) {
+        return Some(Wrong::Crossing(pair));
+    }
+    let left: Vec<usize> = (0..loops.len()).filter(|i| doubled_area(&loops[*i]) > 0.0).collect();
+    let &[outer] = &left[..] else { return Some(Wrong::Outer(left.get(1).copied().unwrap_or(0))) };
+    let holes = || (0..loops.len()).filter(|i| *i != outer);
+    let misplaced = |hole: &usize| {
+        let point = loops[*hole][0];
+        !is_inside(point, &loops[outer]) || holes().any(|other| other != *hole && is_inside(point, &loops[other]))
+    };
+    holes().find(misplaced).map(Wrong::Nesting)
+}
+
+/// Twice the signed area, to rounding; its sign is that of simple polygons of any area above rounding.
+fn doubled_area(polygon: &[GridPoint]) -> f64 {
+    let origin = polygon.first().copied().unwrap_or_default();
+    let next = polygon.iter().cycle().skip(1);
+    polygon.iter().zip(next).map(|(p, q)| orientation(origin, *p, *q) as f64).sum()
+}
+
+/// Two sides that share a point other than the end that neighbours have in common.
+fn crossing(loops: &[Vec<GridPoint>]) -> Option<[(usize, usize); 2]> {
+    let sides: Vec<(usize, usize)> =
+        loops.iter().enumerate().flat_map(|(l, polygon)| (0..polygon.len()).map(move |i| (l, i))).collect();
+    let ends = |(l, i): (usize, usize)| [loops[l][i], loops[l][(i + 1) % loops[l].len()]];
+    let tree = Bvh::new(sides.iter().map(|s| around(ends(*s))).collect());
+    let mut found = None;
+    tree.pairs(|a, b| {
+        let (s, t) = (sides[a as usize], sides[b as usize]);
+        if found.is_none() && clash(ends(s), ends(t), succession(loops, s, t)) {
+            found = Some([s, t]);
+        }
+    });
+    found
+}
+
+/// How two sides follow each other in a loop.
+enum Succession {
+    None,
+    /// The second begins where the first ends.
+    Forward,
+    /// The first begins where the second ends.
+    Backward,
+    /// Both: a loop of two sides.
+    Both,
+}
+
+fn succession(loops: &[Vec<GridPoint>], s: (usize, usize), t: (usize, usize)) -> Succession {
+    let count = loops[s.0].len();
+    let same = s.0 == t.0;
+    match (same && (s.1 + 1) % count == t.1, same && (t.1 + 1) % count == s.1) {
+        (true, true) => Succession::Both,
+        (true, false) => Succession::Forward,
+        (false, true) => Succession::Backward,
+        (false, false) => Succession::None,
+    }
+}
+
+fn clash([a, b]: [GridPoint; 2], [c, d]: [GridPoint; 2], succession: Succession) -> bool {
+    match succession {
+        Succession::Both => true,
+        Succession::Forward => turns_back(a, b, d),
+        Succession::Backward => turns_back(c, d, b),
+        Succession::None => meet([a, b], [c, d]),
+    }
+}
+
+/// Whether the path from `a` over `b` to `c` runs back on itself.
+fn turns_back(a: GridPoint, b: GridPoint, c: GridPoint) -> bool {
+    let (u, v) = (b.from_origin(a), c.from_origin(b));
+    let along = i128::from(u.x) * i128::from(v.x) + i128::from(u.y) * i128::from(v.y);
+    u.cross(v) == 0 && along <= 0
+}
+
+/// Whether two segments have a point in common.
+fn meet([a, b]: [GridPoint; 2], [c, d]: [GridPoint; 2]) -> bool {
+    let sign = |p, q, r| orientation(p, q, r).signum();
+    let (s, t) = ([sign(a, b, c), sign(a, b, d)], [sign(c, d, a), sign(c, d, b)]);
+    if s == [0, 0] && t == [0, 0] {
+        // On one line: their boxes met already, and so do they.
+        return true;
+    }
+    s[0] * s[1] <= 0 && t[0] * t[1] <= 0
+}
+
+/// Whether a point lies inside a polygon that does not pass through it: crossings of a ray to the right.
+fn is_inside(p: GridPoint, polygon: &[GridPoint]) -> bool {
+    let next = polygon.iter().cycle().skip(1);
+    let crossed = |(a, b): &(&GridPoint, &GridPoint)| {
+        let upward = a.y <= p.y && p.y < b.y;
+        let downward = b.y <= p.y && p.y < a.y;
+        let side = orientation(**a, **b, p);
+        (upward && side > 0) || (downward && side < 0)
+    };
+    polygon.iter().zip(next).filter(crossed).count() % 2 == 1
+}
+
+fn around(ends: [GridPoint; 2]) -> BoundingBox {
+    // Doubles of 64-bit integers may be off by a unit in the last place: boxes are a little larger.
+    let slack = |c: i64, way: f64| c as f64 + way * 2.0;
+    let [a, b] = ends;
+    BoundingBox {
+        min: [slack(a.x.min(b.x), -1.0), slack(a.y.min(b.y), -1.0), 0.0],
+        max: [slack(a.x.max(b.x), 1.0), slack(a.y.max(b.y), 1.0), 0.0],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polygon(points: &[[f64; 2]]) -> Vec<GridPoint> {
+        points.iter().map(|p| GridPoint::mid(*p)).collect()
+    }
+
+    fn square(centre: [f64; 2], half: f64) -> Vec<GridPoint> {
+        let at = |x: f64, y: f64| [centre[0] + x * half, centre[1] + y * half];
+        polygon(&[at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)])
+    }
+
+    fn hole(centre: [f64; 2], half: f64) -> Vec<GridPoint> {
+        square(centre, half).into_iter().rev().collect()
+    }
+
+    #[test]
+    fn a_square_with_two_holes_is_right_and_its_broken_twins_are_not() {
+        let outer = square([0.0; 2], 0.9);
+        let (left, right) = (hole([-0.4, 0.0], 0.2), hole([0.4, 0.0], 0.2));
+        assert_eq!(check(&[outer.clone(), left.clone(), right.clone()]), None);
+        assert_eq!(check(&[left.clone(), outer.clone()]), None);
+        assert_eq!(check(&[outer.clone(), square([0.4, 0.0], 0.2)]), Some(Wrong::Outer(1)));
+        assert_eq!(check(&[left.clone(), right.clone()]), Some(Wrong::Outer(0)));
+        assert_eq!(check(&[outer.clone(), left.clone(), hole([-0.4, 0.0], 0.1)]), Some(Wrong::Nesting(2)));
+        assert_eq!(check(&[square([0.0; 2], 0.3), hole([0.7, 0.0], 0.2)]), Some(Wrong::Nesting(1)));
+        assert!(matches!(check(&[outer.clone(), hole([0.8, 0.0], 0.2)]), Some(Wrong::Crossing(_))));
+        // Holes that share a side, a corner on a side, and a path that runs back.
+        assert!(matches!(check(&[outer.clone(), left.clone(), hole([0.0, 0.0], 0.2)]), Some(Wrong::Crossing(_))));
+        let spike = polygon(&[[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [0.9, 0.0], [-0.9, 0.9]]);
+        assert!(matches!(check(&[spike]), Some(Wrong::Crossing(_))));
+        let bow = polygon(&[[-0.5, -0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, 0.5]]);
+        assert!(matches!(check(&[bow]), Some(Wrong::Crossing(_))));
+    }
+
+    #[test]
+    fn straight_on_is_no_crossing() {
+        let corners = [[-0.5, -0.5], [0.0, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]];
+        assert_eq!(check(&[polygon(&corners)]), None);
+    }
+}
