@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::settings::{FeatureAngle, HandOff, Inputs, Log, Said, Settings, SettingsError};
+use crate::verbs::check_mesh::Question;
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -24,7 +25,7 @@ pub enum Verb {
     Run(Run),
     /// Process every file that is dropped into a folder, until told to stop
     Watch(Watch),
-    /// Re-prove certificates from the files on disk, trusting nothing else
+    /// Re-prove certificates from the files on disk, trusting nothing else; or judge a mesh made through the maps
     Check(Check),
     /// Tell what a surface is: topology, defects
     Info(Info),
@@ -136,9 +137,30 @@ pub struct Check {
     /// Output folders of inputs, or their report.json
     #[arg(required = true, value_name = "DIR|report.json")]
     pub results: Vec<PathBuf>,
+    /// Judge this mesh, made through the maps of the one result: is anything lost or folded, are its elements good? The
+    /// certificates are not proven again. What is found is kept as mesh.json in the result folder
+    #[arg(long, value_name = "MESH")]
+    pub mesh: Option<PathBuf>,
+    /// The edge length that the mesher was asked for, in the unit of the input [default: that of remesh.geo]
+    #[arg(long, value_name = "H", requires = "mesh")]
+    pub size: Option<f64>,
+    /// The least gamma of a fine element
+    #[arg(long, value_name = "G", requires = "mesh", default_value_t = 0.1)]
+    pub min_gamma: f64,
+    /// Print what is found of the mesh as JSON
+    #[arg(long, requires = "mesh")]
+    pub json: bool,
     /// Shared options
     #[command(flatten)]
     pub common: Common,
+}
+
+impl Check {
+    /// What is asked of a mesh, if one is given.
+    pub fn question(&self) -> Option<Question> {
+        let Self { size, min_gamma, json, .. } = *self;
+        Some(Question { mesh: self.mesh.clone()?, size, min_gamma, json })
+    }
 }
 
 /// `planish info`

@@ -4,7 +4,7 @@ use crate::formats::gmsh;
 use crate::report::HandOff;
 use pipeline::CertifiedChart;
 use pipeline::atlas::Chart;
-use pipeline::id::{ChartId, FaceId};
+use pipeline::id::{ChartId, CurveId, FaceId};
 use pipeline::mesh::SurfaceMesh;
 use pipeline::seams::SeamNetwork;
 use pipeline::space::unit_scale;
@@ -16,8 +16,15 @@ const EDGES_PER_DIAGONAL: f64 = 50.0;
 /// Maps whose conformal distortion exceeds this on a hundredth of their area are left to MeshAdapt: the other algorithms
 /// of Gmsh measure lengths by the map at one point, and miss whole parts of a surface where that changes from triangle to
 /// triangle. Of 150 surfaces with more than 200 elements, all 40 that had elements below gamma 0.1 or lost area by
-/// Frontal-Delaunay were above 9 (patch_10ks, 7.1, has none; aneurysm, 41, has two), half of those above 20 had some.
-const STRETCHED: f64 = 8.0;
+/// Frontal-Delaunay were above 10 (gebco_seabed, 9.3, has none, and MeshAdapt cuts one of its hills off; aneurysm, 41, has
+/// two), half of those above 20 had some.
+const STRETCHED: f64 = 10.0;
+
+/// A place is narrow if it is narrower than this share of an edge: elements are as small there.
+const NARROW: f64 = 0.75;
+
+/// Closed curves get at least so many edges.
+const EDGES_PER_LOOP: f64 = 6.0;
 
 /// MeshAdapt of Gmsh looks for closest points among all triangles within this distance, in whatever unit.
 const SEARCHED: f64 = 0.1;
@@ -58,8 +65,38 @@ pub fn gmsh(
         tracing::warn!("hand-off to Gmsh: {warning}");
     }
     let algorithms = algorithms(&linear, conformal_p99, size);
-    let report = counted(report, &linear, &algorithms);
-    HandedOff { files: files(mesh, charts, &linear, network, size, algorithms), report }
+    let narrow = narrow(charts, network, size);
+    let report =
+        HandOff { narrow_curves: narrow.iter().map(|n| n.curves.len()).sum(), ..counted(report, &linear, &algorithms) };
+    HandedOff { files: files(mesh, charts, &linear, network, size, algorithms, narrow), report }
+}
+
+/// The curves along narrow places, by the size of elements there: half of `size`, a quarter, and so on.
+fn narrow(charts: &[Chart], network: &SeamNetwork, size: f64) -> Vec<gmsh::Narrow> {
+    let length = |c: CurveId| network.curves()[c.index()].length();
+    let width = |chart: &Chart| {
+        let area: f64 = (0..chart.triangles().len()).map(|f| chart.area(f)).sum();
+        let perimeter: f64 = network.loops(chart.id()).iter().flatten().map(|p| length(p.curve)).sum();
+        // That of a strip of any length; the radius of a disk.
+        2.0 * area / perimeter
+    };
+    let widths: Vec<f64> = charts.iter().map(width).collect();
+    let mut found: Vec<gmsh::Narrow> = Vec::new();
+    for halvings in 1..=gmsh::Narrow::HALVINGS {
+        found.push(gmsh::Narrow { size: size * 0.5_f64.powi(halvings as i32), curves: vec![], longest: 0.0 });
+    }
+    for curve in network.curves() {
+        let own = if curve.is_closed() { curve.length() / EDGES_PER_LOOP } else { curve.length() };
+        let wanted = curve.sides().iter().map(|s| widths[s.chart.index()]).fold(own, f64::min);
+        if wanted < NARROW * size {
+            let halvings = (size / wanted).log2().round().clamp(1.0, f64::from(gmsh::Narrow::HALVINGS));
+            let at = &mut found[halvings as usize - 1];
+            at.curves.push(curve.id().index());
+            at.longest = at.longest.max(curve.length());
+        }
+    }
+    found.retain(|n| !n.curves.is_empty());
+    found
 }
 
 /// MeshAdapt where maps stretch, in a unit in which it searches little more than a tenth of an edge around a point.
@@ -78,10 +115,11 @@ fn files(
     network: &SeamNetwork,
     size: f64,
     algorithms: gmsh::Algorithms,
+    narrow: Vec<gmsh::Narrow>,
 ) -> Vec<(String, Vec<u8>)> {
     let enlarged = Some(algorithms.enlarged).filter(|factor| *factor != 1.0);
     let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
-    let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms };
+    let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow };
     let mut files = vec![
         (gmsh::ATLAS.to_owned(), gmsh::atlas(charts, linear, network)),
         (gmsh::REMESH.to_owned(), gmsh::remesh(&script)),

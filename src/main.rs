@@ -24,7 +24,10 @@ fn dispatch(verb: &Verb, settings: &Settings) -> Result<Exit, Box<dyn std::error
     match verb {
         Verb::Run(run) => verbs::run::run(&run.inputs, settings),
         Verb::Watch(watch) => verbs::watch::watch(&watch.inbox, settings),
-        Verb::Check(check) => Ok(verbs::check::check(&check.results, settings.quiet)),
+        Verb::Check(check) => match check.question() {
+            Some(question) => verbs::check_mesh::check_mesh(&check.results, &question, settings),
+            None => Ok(verbs::check::check(&check.results, settings.quiet)),
+        },
         Verb::Info(info) => verbs::info::info(&info.inputs, info.json, settings),
         Verb::Status(status) => verbs::status::status(status.json, settings),
     }

@@ -8,6 +8,7 @@ mod msh;
 #[path = "../../tests/fuzz/mutate/mod.rs"]
 mod mutate;
 mod obj;
+mod patches;
 mod place;
 mod ply;
 mod polygon;
@@ -19,6 +20,7 @@ mod words;
 
 use crate::outcome::{Code, Reason};
 pub use content::{Beside, Content, Limits, Notes, Nothing, Source, TooMany};
+pub use patches::Patches;
 use pipeline::mesh::SoupError;
 use std::path::Path;
 pub use vtk::{vtm, vtp, vtu};
@@ -248,6 +250,20 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
         Format::Ply => ply::read(&unmarked),
         Format::Msh => msh::read(&unmarked),
     }
+}
+
+/// Reads a mesh with what its file tells of its elements: in MSH files the entities and the nodes in the middle of sides,
+/// elsewhere the corners of triangles only.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_patches(format: Format, source: &Source) -> Result<Patches, ReadError> {
+    if sniff::sniff(source.bytes).unwrap_or(format) == Format::Msh && !source.bytes.is_empty() {
+        let bytes = source.bytes.strip_prefix(sniff::MARK).unwrap_or(source.bytes);
+        return msh::read_patches(&Source { bytes, ..*source });
+    }
+    let soup = read(format, source)?.soup;
+    Ok(Patches::new(soup.points().to_vec(), soup.triangles().to_vec(), vec![], None)?)
 }
 
 /// As [`read`], with the usual limits and nothing beside the file.

@@ -2,6 +2,7 @@
 //! grows.
 
 mod build;
+pub mod mesh;
 
 use crate::formats::Notes;
 use crate::outcome::{Reason, Status};
@@ -362,6 +363,9 @@ pub struct HandOff {
     /// Charts that Gmsh's MeshAdapt is asked to mesh, as their maps stretch.
     #[serde(default)]
     pub adapted_charts: Vec<u32>,
+    /// Curves along narrow places, where remesh.geo asks for smaller elements.
+    #[serde(default)]
+    pub narrow_curves: usize,
     /// By how much lengths are multiplied in the atlas that remesh.geo merges; 1: that is atlas.msh.
     #[serde(default = "unchanged")]
     pub enlarged: f64,

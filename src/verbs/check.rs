@@ -24,7 +24,7 @@ const HANDED_OFF: [&str; 2] = [gmsh::ATLAS, gmsh::REMESH];
 
 /// What can be wrong with a result.
 #[derive(Debug, thiserror::Error)]
-enum Finding {
+pub(super) enum Finding {
     #[error("{file}: {problem}")]
     File { file: String, problem: String },
     #[error("the input was not certified ({0}): there is nothing to prove")]
@@ -73,7 +73,7 @@ pub fn check(results: &[PathBuf], quiet: bool) -> Exit {
 }
 
 /// The result folder that a path names.
-fn folder(path: &Path) -> Option<&Path> {
+pub(super) fn folder(path: &Path) -> Option<&Path> {
     if path.is_dir() {
         return Some(path);
     }
@@ -108,11 +108,11 @@ fn check_one(folder: &Path) -> Findings {
     found
 }
 
-fn read(folder: &Path, name: &str) -> Result<Vec<u8>, Finding> {
+pub(super) fn read(folder: &Path, name: &str) -> Result<Vec<u8>, Finding> {
     read_file(&folder.join(name)).map_err(|reason| file(name, reason.message))
 }
 
-fn read_report(folder: &Path) -> Result<Report, Finding> {
+pub(super) fn read_report(folder: &Path) -> Result<Report, Finding> {
     let bytes = read(folder, report::FILE)?;
     let report: Report = serde_json::from_slice(&bytes).map_err(|e| file(report::FILE, e))?;
     if report.schema != report::SCHEMA {
@@ -151,7 +151,7 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
     missing.chain(damaged).collect()
 }
 
-fn read_grid(folder: &Path, name: &str) -> Result<Grid, Finding> {
+pub(super) fn read_grid(folder: &Path, name: &str) -> Result<Grid, Finding> {
     vtu::read(&read(folder, name)?).map_err(|e| file(name, e))
 }
 

@@ -1,6 +1,7 @@
 //! The verbs of the command line.
 
 pub mod check;
+pub mod check_mesh;
 pub mod info;
 pub mod run;
 pub mod status;

@@ -18,6 +18,31 @@ pub struct Script {
     pub curves: usize,
     /// By which algorithms.
     pub algorithms: Algorithms,
+    /// Where elements are smaller.
+    pub narrow: Vec<Narrow>,
+}
+
+/// Curves along places that are narrower than an edge.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Narrow {
+    /// The size of elements there, in the unit of the input.
+    pub size: f64,
+    /// The curves, counted from 0.
+    pub curves: Vec<usize>,
+    /// The length of the longest of them.
+    pub longest: f64,
+}
+
+impl Narrow {
+    /// The sizes of narrow places: the size halved so often at most. Narrower ones get elements of the least of these: beyond
+    /// it a mesh would be many times as large for places that nobody sees.
+    pub const HALVINGS: u32 = 5;
+
+    /// Points of a curve from which distances are measured, at most: curves are polylines of many more.
+    const MOST_SAMPLES: f64 = 500.0;
+
+    /// How much larger elements may become over a distance.
+    const GRADATION: f64 = 0.3;
 }
 
 /// The algorithms that the script asks for.
@@ -31,7 +56,7 @@ pub struct Algorithms {
 
 /// The bytes of `remesh.geo`.
 pub fn remesh(script: &Script) -> Vec<u8> {
-    let Script { size, area, surfaces, curves, algorithms } = script;
+    let Script { size, area, surfaces, curves, algorithms, narrow } = script;
     let factor = algorithms.enlarged;
     format!(
         "// Remesh this surface through its certified maps:
@@ -49,14 +74,15 @@ SetFactory(\"Built-in\");
 // The edge length, in the unit of the input: change this number, or give -setnumber size H.
 DefineConstant[ size = {{{size}, Name \"Edge length\"}} ];
 
-// One size everywhere. For smaller elements where the surface bends, let Mesh.MeshSizeMin be smaller and uncomment
-// the line with the number of elements per full turn.
-Mesh.MeshSizeMin = size{times};
+// One size everywhere{but}. For smaller elements where the surface bends, let Mesh.MeshSizeMin be smaller and
+// uncomment the line with the number of elements per full turn.
+Mesh.MeshSizeMin = {least}size{times};
 Mesh.MeshSizeMax = size{times};
 Mesh.MeshSizeExtendFromBoundary = 0;
 Mesh.MeshSizeFromPoints = 0;
+Mesh.Smoothing = 5;
 // Mesh.MeshSizeFromCurvature = 20;
-
+{fields}
 // 6 (Frontal-Delaunay) makes the better triangles, 5 (Delaunay) is many times faster where there are many of them;
 // 8 makes triangles fit to be recombined.
 If(2.31 * {area} / size^2 < {MANY})
@@ -74,6 +100,9 @@ Mesh.AlgorithmSwitchOnFailure = 0;
 ",
         merge = merge(factor),
         times = if factor == 1.0 { String::new() } else { format!(" * {factor}") },
+        but = if narrow.is_empty() { "" } else { ", but in narrow places" },
+        least = if narrow.is_empty() { String::new() } else { format!("1 / {} * ", 2_u32.pow(Narrow::HALVINGS)) },
+        fields = fields(narrow, factor),
         adapted = adapted(&algorithms.adapted),
     )
     .into_bytes()
@@ -99,34 +128,73 @@ fn adapted(surfaces: &[usize]) -> String {
     if surfaces.is_empty() {
         return String::new();
     }
-    let mut text = String::from(
+    format!(
         "// Maps that stretch: there the algorithms above leave parts of the surface out, or make slivers. MeshAdapt does not,
 // but takes ten times as long.
-MeshAlgorithm Surface {",
-    );
-    for (i, surface) in surfaces.iter().enumerate() {
-        let separator = match i {
-            0 => "",
-            _ if i % 20 == 0 => ",\n  ",
-            _ => ", ",
-        };
-        text += &format!("{separator}{}", surface + 1);
+MeshAlgorithm Surface {{{}}} = 1;
+
+",
+        tags(surfaces)
+    )
+}
+
+/// Smaller elements in narrow places, and ever larger ones away from them.
+fn fields(narrow: &[Narrow], factor: f64) -> String {
+    if narrow.is_empty() {
+        return String::new();
     }
-    text + "} = 1;\n\n"
+    let mut text = String::from(
+        "
+// Smaller elements around curves that are shorter than an edge, or bound charts that are narrower.
+",
+    );
+    for (i, place) in narrow.iter().enumerate() {
+        let (distance, threshold) = (2 * i + 1, 2 * i + 2);
+        let (size, gradation) = (place.size, Narrow::GRADATION);
+        let samples = (place.longest / size).ceil().clamp(10.0, Narrow::MOST_SAMPLES);
+        text += &format!(
+            "Field[{distance}] = Distance;
+Field[{distance}].CurvesList = {{{curves}}};
+Field[{distance}].Sampling = {samples};
+Field[{threshold}] = Threshold;
+Field[{threshold}].InField = {distance};
+Field[{threshold}].SizeMin = (size < {size} ? size : {size}) * {factor};
+Field[{threshold}].SizeMax = size * {factor};
+Field[{threshold}].DistMin = 2 * {size} * {factor};
+Field[{threshold}].DistMax = (size < {size} ? {size} : size) / {gradation} * {factor};
+",
+            curves = tags(&place.curves),
+        );
+    }
+    let all = 2 * narrow.len() + 1;
+    let thresholds: Vec<usize> = (0..narrow.len()).map(|i| 2 * i + 1).collect();
+    text + &format!(
+        "Field[{all}] = Min;
+Field[{all}].FieldsList = {{{}}};
+Background Field = {all};
+",
+        tags(&thresholds)
+    )
+}
+
+/// The tags of entities that are counted from 0, in lines of twenty.
+fn tags(entities: &[usize]) -> String {
+    let lines = entities.chunks(20).map(|line| line.iter().map(|e| (e + 1).to_string()).collect::<Vec<_>>().join(", "));
+    lines.collect::<Vec<_>>().join(",\n  ")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn script(algorithms: Algorithms) -> String {
-        let script = Script { size: 0.1 + 0.2, area: 4.5, surfaces: 2, curves: 1, algorithms };
+    fn script(algorithms: Algorithms, narrow: Vec<Narrow>) -> String {
+        let script = Script { size: 0.1 + 0.2, area: 4.5, surfaces: 2, curves: 1, algorithms, narrow };
         String::from_utf8(remesh(&script)).expect("UTF-8")
     }
 
     #[test]
     fn the_script_holds_the_size_in_full() {
-        let text = script(Algorithms { adapted: vec![], enlarged: 1.0 });
+        let text = script(Algorithms { adapted: vec![], enlarged: 1.0 }, vec![]);
         assert!(text.contains("size = {0.30000000000000004, Name"), "{text}");
         assert!(text.contains("Merge \"atlas.msh\";"));
         assert!(!text.contains("MeshAlgorithm") && !text.contains("ScalingFactor"), "{text}");
@@ -134,9 +202,26 @@ mod tests {
 
     #[test]
     fn surfaces_are_counted_from_one_and_lengths_are_enlarged_alike() {
-        let text = script(Algorithms { adapted: (0..22).collect(), enlarged: 1024.0 });
+        let text = script(Algorithms { adapted: (0..22).collect(), enlarged: 1024.0 }, vec![]);
         assert!(text.contains("MeshAlgorithm Surface {1, 2,") && text.contains(", 20,\n  21, 22} = 1;"), "{text}");
         assert!(text.contains("Merge \"atlas-enlarged.msh\";\nMesh.ScalingFactor = 1 / 1024;"), "{text}");
         assert!(text.contains("MeshSizeMax = size * 1024;"), "{text}");
+    }
+
+    #[test]
+    fn narrow_places_have_fields_of_their_own() {
+        let place = |size, curves| Narrow { size, curves, longest: 1.0 };
+        let algorithms = Algorithms { adapted: vec![], enlarged: 4.0 };
+        let text = script(algorithms, vec![place(0.15, vec![0, 6]), place(0.075, vec![2])]);
+        for line in [
+            "Mesh.MeshSizeMin = 1 / 32 * size * 4;",
+            "Field[1].CurvesList = {1, 7};",
+            "Field[3].CurvesList = {3};",
+            "Field[4].SizeMin = (size < 0.075 ? size : 0.075) * 4;",
+            "Field[5].FieldsList = {2, 4};",
+            "Background Field = 5;",
+        ] {
+            assert!(text.contains(line), "{line} is not in\n{text}");
+        }
     }
 }

@@ -5,8 +5,10 @@
 mod binary;
 mod geo;
 mod mesh;
+mod read;
 
-pub use geo::{Algorithms, Script, remesh};
+pub use geo::{Algorithms, Narrow, Script, remesh};
+pub use read::{AtlasError, read as read_atlas};
 
 use binary::Binary;
 use pipeline::atlas::Chart;

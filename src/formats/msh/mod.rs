@@ -14,7 +14,7 @@ mod values;
 
 use super::place::{Place, shown};
 use super::words::{Words, float};
-use super::{Content, Limits, Notes, ReadError, Source, TooMany};
+use super::{Content, Limits, Notes, Patches, ReadError, Source, TooMany};
 use crate::outcome::Code;
 use nodes::Nodes;
 use surface::Surface;
@@ -215,6 +215,17 @@ enum Version {
 
 /// Reads an MSH file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
+    let (surface, mut notes) = surface(source, false)?;
+    Ok(Content { soup: surface.finish(&mut notes)?, notes })
+}
+
+/// Reads an MSH file with the entities of its triangles, and the nodes in the middle of their sides.
+pub(super) fn read_patches(source: &Source) -> Result<Patches, ReadError> {
+    Ok(surface(source, true)?.0.finish_patches()?)
+}
+
+/// Reads the triangles of an MSH file.
+fn surface<'n>(source: &Source<'n>, keep: bool) -> Result<(Surface<'n>, Notes), ReadError> {
     let mut words = Words::new(source.bytes, 1);
     let mut begins = words.next().unwrap_or_default();
     while begins == b"$Comments" {
@@ -239,10 +250,10 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     }
     let name = shown(name);
     match encoding {
-        b"0" => body(Text(words), version, source.limits, Notes::new(format!("MSH {name}, ASCII"))),
+        b"0" => body(Text(words), version, source.limits, keep, Notes::new(format!("MSH {name}, ASCII"))),
         b"1" => {
             let (values, order) = binary(source.bytes, words)?;
-            body(values, version, source.limits, Notes::new(format!("MSH {name}, binary, {order}")))
+            body(values, version, source.limits, keep, Notes::new(format!("MSH {name}, binary, {order}")))
         }
         other => Err(format_error(line, format!("\"{}\" is neither 0 (ASCII) nor 1 (binary)", shown(other))).into()),
     }
@@ -276,16 +287,19 @@ fn binary<'a>(file: &'a [u8], words: Words<'a>) -> Result<(Binary<'a>, &'static 
 struct Found<'n> {
     nodes: Option<Nodes>,
     surface: Option<Surface<'n>>,
+    /// Whether more than the corners of triangles is kept.
+    keep: bool,
 }
 
 /// Reads all sections, from the end of the format on.
-fn body<'a, V: Values<'a>>(
+fn body<'a, 'n, V: Values<'a>>(
     mut values: V,
     version: Version,
-    limits: &Limits,
+    limits: &'n Limits,
+    keep: bool,
     mut notes: Notes,
-) -> Result<Content, ReadError> {
-    let mut found = Found::default();
+) -> Result<(Surface<'n>, Notes), ReadError> {
+    let mut found = Found { keep, ..Found::default() };
     end_section(&mut values, b"MeshFormat")?;
     // Whatever stands between sections is a comment.
     while let Some(word) = values.word() {
@@ -301,7 +315,7 @@ fn body<'a, V: Values<'a>>(
     }
     let none = |section| MshError::NoSection { section, late: false };
     let surface = found.surface.ok_or_else(|| none(if found.nodes.is_some() { "Elements" } else { "Nodes" }))?;
-    Ok(Content { soup: surface.finish(&mut notes)?, notes })
+    Ok((surface, notes))
 }
 
 impl<'n> Found<'n> {
@@ -324,7 +338,7 @@ impl<'n> Found<'n> {
             (b"Elements", _) if self.surface.is_some() => return Err(second(name, values)),
             (b"Elements", _) => {
                 let nodes = self.nodes.take().ok_or(MshError::NoSection { section: "Nodes", late: true })?;
-                let surface = self.surface.insert(Surface::new(nodes, limits));
+                let surface = self.surface.insert(Surface::new(nodes, limits, self.keep));
                 match version {
                     Version::Two => sections::elements_2(values, surface)?,
                     Version::Four => sections::elements_4(values, surface)?,

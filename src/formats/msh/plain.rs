@@ -23,6 +23,9 @@ pub struct Layout {
 impl Surface<'_> {
     /// Adds as many elements as are plain, of at most so many; how many they are.
     pub fn plain(&mut self, binary: &mut Binary, layout: Layout, most: u64) -> u64 {
+        if self.keeps() {
+            return 0;
+        }
         let triangles = if layout.shape.kind == Kind::Quad { 2 } else { 1 };
         let most = most.min(self.limits.elements.saturating_sub(self.triangles.len() as u64) / triangles);
         match (layout.size, layout.shape.kind) {

@@ -134,7 +134,7 @@ fn lines_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64)
     for _ in 0..count {
         let (element, number, tags) = (values.natural()?, values.int()?, values.natural()?);
         let shape = shape(values, number)?;
-        values.skip(tags, V::INT)?;
+        tags_2(values, surface, tags)?;
         match shape.kind {
             Kind::Other(kind) => {
                 surface.skip(kind, 1);
@@ -144,6 +144,16 @@ fn lines_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64)
         }
     }
     Ok(())
+}
+
+/// The further tags of an element: the second one is that of its entity.
+fn tags_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, tags: u64) -> Result<(), Fault> {
+    if tags < 2 {
+        return values.skip(tags, V::INT);
+    }
+    values.skip(1, V::INT)?;
+    surface.entity = values.int()?;
+    values.skip(tags - 2, V::INT)
 }
 
 /// Elements of one type together: type, how many, number of further tags; then of each its tag, these, nodes.
@@ -163,7 +173,7 @@ fn blocks_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64
         let plain = values.binary().map_or(0, |binary| surface.plain(binary, layout, block));
         for _ in plain..block {
             let element = values.natural()?;
-            values.skip(tags, V::INT)?;
+            tags_2(values, surface, tags)?;
             surface.element(values, shape, element, V::natural)?;
         }
     }
@@ -178,7 +188,8 @@ pub fn elements_4<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> R
     fits(values, "elements", count, 2 * V::SIZE, surface.limits.elements)?;
     let mut left = count;
     for _ in 0..blocks {
-        values.skip(2, V::INT)?;
+        values.skip(1, V::INT)?;
+        surface.entity = values.int()?;
         let (number, block) = (values.int()?, values.size()?);
         let shape = shape(values, number)?;
         within(values, "elements", block, left, count)?;

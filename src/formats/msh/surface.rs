@@ -5,7 +5,7 @@ use super::nodes::Nodes;
 use super::shapes::{Kind, Shape};
 use super::values::{Fault, Values};
 use crate::formats::place::Place;
-use crate::formats::{Limits, Notes, TooMany, polygon};
+use crate::formats::{Limits, Notes, Patches, TooMany, polygon};
 use pipeline::mesh::{SoupError, TriangleSoup};
 use std::collections::BTreeMap;
 
@@ -21,14 +21,33 @@ pub struct Surface<'n> {
     polygons: [usize; 2],
     /// The nodes of the element at hand.
     at_hand: Vec<u64>,
+    /// What is kept of each triangle beside its corners, where that is asked for.
+    kept: Option<Kept>,
+    /// The entity of the elements at hand.
+    pub(super) entity: i64,
     pub limits: &'n Limits,
 }
 
+/// What meshes tell of a triangle beside its corners.
+#[derive(Default)]
+struct Kept {
+    /// The nodes in the middle of the sides 01, 12, 20 of a triangle of six nodes.
+    mids: Vec<Option<[u32; 3]>>,
+    entities: Vec<i64>,
+}
+
 impl<'n> Surface<'n> {
-    /// No triangles.
-    pub fn new(nodes: Nodes, limits: &'n Limits) -> Self {
+    /// No triangles. Those to come are remembered with their entities and the nodes in the middle of their sides, if
+    /// `keep` says so.
+    pub fn new(nodes: Nodes, limits: &'n Limits, keep: bool) -> Self {
         let (mids, triangles, skipped, at_hand) = (Vec::new(), Vec::new(), BTreeMap::new(), Vec::new());
-        Self { nodes, mids, triangles, skipped, polygons: [0; 2], at_hand, limits }
+        let kept = keep.then(Kept::default);
+        Self { nodes, mids, triangles, skipped, polygons: [0; 2], at_hand, kept, entity: 0, limits }
+    }
+
+    /// Whether elements must be looked at one by one.
+    pub(super) fn keeps(&self) -> bool {
+        self.kept.is_some()
     }
 
     /// Counts elements that are no part of a surface.
@@ -56,6 +75,7 @@ impl<'n> Surface<'n> {
     fn add(&mut self, shape: Shape, element: u64, place: Place) -> Result<(), MshError> {
         let mut corners = [0; 4];
         let count = if shape.kind == Kind::Quad { 4 } else { 3 };
+        let mut mids = [0; 3];
         for i in 0..self.at_hand.len() {
             let node = self.at_hand[i];
             let found = self.nodes.find(node).ok_or(MshError::NoNode { element, node, place })?;
@@ -63,9 +83,15 @@ impl<'n> Surface<'n> {
                 corners[i] = found;
             } else {
                 self.mark(found);
+                mids.get_mut(i - count).into_iter().for_each(|mid| *mid = found);
             }
         }
         self.face(&corners[..count]);
+        if let Some(kept) = &mut self.kept {
+            let is_quadratic = shape.kind == Kind::Triangle && shape.nodes == 6;
+            kept.mids.resize(self.triangles.len(), is_quadratic.then_some(mids));
+            kept.entities.resize(self.triangles.len(), self.entity);
+        }
         Ok(TooMany::check("triangles", self.triangles.len() as u64, self.limits.elements)?)
     }
 
@@ -83,6 +109,13 @@ impl<'n> Surface<'n> {
         let is_doubtful = polygon::add(corners, &self.nodes.points, &mut self.triangles);
         self.polygons[0] += usize::from(corners.len() > 3);
         self.polygons[1] += usize::from(is_doubtful);
+    }
+
+    /// All triangles with all that was kept of them, and all nodes.
+    pub fn finish_patches(self) -> Result<Patches, SoupError> {
+        let Self { nodes, triangles, kept, .. } = self;
+        let Kept { mids, entities } = kept.unwrap_or_default();
+        Patches::new(nodes.points, triangles, mids, Some(entities))
     }
 
     /// All triangles, and the nodes without those that lie in the middle of edges and faces only.

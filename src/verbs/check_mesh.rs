@@ -1,0 +1,228 @@
+//! `planish check DIR --mesh FILE`: does a mesh represent the surface of a result, and are its elements good?
+//!
+//! The surface is read from surface.vtu, the maps that the mesher used from atlas.msh: both must be what was published.
+//! What is found is told, and kept as mesh.json beside the report.
+
+use super::check::{folder, read, read_grid, read_report};
+use super::{Exit, complain, say, say_json, shown};
+use crate::formats::gmsh;
+use crate::formats::vtu::Grid;
+use crate::formats::{self, Kind, Nothing, Patches, READ, Source};
+use crate::outcome::Reason;
+use crate::report::mesh::{MeshReport, PLACES};
+use crate::report::{Output, Report};
+use crate::settings::Settings;
+use crate::stages::{guard, read_file};
+use pipeline::soundness::{self, HandedOverAtlas, Mesh, Triangulation};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What is asked of a mesh.
+#[derive(Clone, Debug)]
+pub struct Question {
+    /// The mesh.
+    pub mesh: PathBuf,
+    /// The edge length that was asked for; that of the hand-off where none is given.
+    pub size: Option<f64>,
+    /// The least gamma of a fine element.
+    pub min_gamma: f64,
+    /// Whether to print JSON.
+    pub json: bool,
+}
+
+/// The file in the result folder that keeps what was found.
+pub const FILE: &str = "mesh.json";
+
+/// How far nodes may be off the surface, relative to its diagonal: single precision rounds by a tenth of that.
+const OFF_SURFACE: f64 = 1e-6;
+
+/// Why a mesh cannot be judged.
+#[derive(Debug, thiserror::Error)]
+enum Unjudged {
+    #[error("{0}")]
+    Told(String),
+    #[error("{0}: its content is not what was published; run planish again, or planish check to see what is wrong")]
+    Changed(&'static str),
+    #[error("the result has no hand-off to tell the edge length: give --size H, in the unit of the input")]
+    NoSize,
+}
+
+/// Judges one mesh against one result.
+///
+/// # Errors
+/// Wrong usage.
+pub fn check_mesh(
+    results: &[PathBuf],
+    question: &Question,
+    settings: &Settings,
+) -> Result<Exit, Box<dyn std::error::Error>> {
+    let [result] = results else {
+        return Err("--mesh judges one mesh: name the one result that it was made from".into());
+    };
+    if question.size.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
+        return Err("--size must be a positive number: the edge length that the mesher was asked for".into());
+    }
+    if !(0.0..=1.0).contains(&question.min_gamma) {
+        return Err("--min-gamma must lie between 0 and 1".into());
+    }
+    let name = shown(&question.mesh);
+    let judged = guard(|| {
+        let folder = folder(result).ok_or("is neither a result folder nor a report.json".to_owned());
+        let folder = folder.map_err(|problem| Unjudged::Told(format!("{} {problem}", shown(result))));
+        Ok::<_, Reason>(folder.and_then(|folder| Ok((folder, judge(folder, question, settings)?))))
+    });
+    let (folder, report) = match judged {
+        Ok(Ok(judged)) => judged,
+        Ok(Err(unjudged)) => {
+            complain(&format!("{name}: not judged: {unjudged}"));
+            return Ok(Exit::Refused);
+        }
+        Err(broken) => {
+            complain(&format!("{name}: not judged: {}", broken.message));
+            return Ok(Exit::Refused);
+        }
+    };
+    if question.json {
+        say_json(&report)?;
+    } else if !settings.quiet {
+        say(&text(&name, &report));
+    }
+    if let Err(error) = keep(folder, &report) {
+        complain(&format!("{}: cannot be written: {error}", shown(&folder.join(FILE))));
+        return Ok(Exit::Refused);
+    }
+    if !report.faithful {
+        complain(&format!("{name}: not faithful: {}", report.defects[0].message));
+    }
+    Ok(if report.faithful && report.fine { Exit::Success } else { Exit::Refused })
+}
+
+fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<MeshReport, Unjudged> {
+    let told = |problem: &dyn std::fmt::Display| Unjudged::Told(problem.to_string());
+    let report = read_report(folder).map_err(|e| told(&e))?;
+    let (surface_file, grid) = surface(folder, &report)?;
+    let size = question.size.or(report.hand_off.as_ref().map(|h| h.size)).ok_or(Unjudged::NoSize)?;
+    let bytes = read_file(&question.mesh).map_err(|e| told(&e.message))?;
+    let patches = decode(&question.mesh, &bytes, settings).map_err(|e| told(&e.message))?;
+    let charts: Vec<u32> = grid.chart.iter().map(|c| u32::try_from(*c).unwrap_or(u32::MAX)).collect();
+    let corners = grid.cells.iter().map(|[a, b, c, ..]| [*a, *b, *c]);
+    let surface = Triangulation::welded(&grid.points, corners);
+    let atlas = if patches.surfaces().is_some() { atlas(folder, &report)? } else { None };
+    let asked = soundness::Settings { size, min_gamma: question.min_gamma, off_surface: OFF_SURFACE };
+    let found = soundness::examine(&mesh(&patches), &surface, &charts, atlas.as_ref(), &asked);
+    let name = question.mesh.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    Ok(MeshReport::new(Output::of(&name, &bytes), surface_file, size, question.min_gamma, &found))
+}
+
+/// The surface of a result, as it was published.
+fn surface(folder: &Path, report: &Report) -> Result<(Output, Grid), Unjudged> {
+    let bytes = published(folder, report, "surface.vtu")?.ok_or(Unjudged::Changed("surface.vtu"))?;
+    let grid = read_grid(folder, "surface.vtu").map_err(|e| Unjudged::Told(e.to_string()))?;
+    Ok((Output::of("surface.vtu", &bytes), grid))
+}
+
+/// The maps that the mesher used, if the result has any.
+fn atlas(folder: &Path, report: &Report) -> Result<Option<HandedOverAtlas>, Unjudged> {
+    let Some(bytes) = published(folder, report, gmsh::ATLAS)? else { return Ok(None) };
+    let atlas = gmsh::read_atlas(&bytes).map_err(|e| Unjudged::Told(format!("{}: {e}", gmsh::ATLAS)))?;
+    Ok(Some(atlas))
+}
+
+/// The bytes of a file of the result; none where it has no such file.
+fn published(folder: &Path, report: &Report, name: &'static str) -> Result<Option<Vec<u8>>, Unjudged> {
+    let Some(listed) = report.outputs.iter().find(|o| o.file == name) else { return Ok(None) };
+    let bytes = read(folder, name).map_err(|e| Unjudged::Told(e.to_string()))?;
+    if Output::of(name, &bytes) == *listed { Ok(Some(bytes)) } else { Err(Unjudged::Changed(name)) }
+}
+
+fn decode(path: &Path, bytes: &[u8], settings: &Settings) -> Result<Patches, Reason> {
+    let Kind::Mesh(format) = formats::kind(path) else {
+        let message = format!("the file name tells no mesh; name one of {READ}");
+        return Err(Reason::new(crate::outcome::Code::UnknownExtension, message));
+    };
+    let source = Source { bytes, limits: &settings.limits, beside: &Nothing };
+    formats::read_patches(format, &source).map_err(|e| e.reason())
+}
+
+/// The mesh in the terms of the core. Nodes of MSH files that lie on each other are made one, as in other formats.
+fn mesh(patches: &Patches) -> Mesh {
+    let all = patches.triangles().iter().copied();
+    let flat = patches.mids().iter().map(|m| m.unwrap_or_default());
+    // Corners and nodes in the middle are welded alike.
+    let welded = Triangulation::welded(patches.points(), all.chain(flat));
+    let count = patches.triangles().len();
+    let (triangles, mids) = welded.triangles.split_at(count);
+    let mids = patches.mids().iter().zip(mids).map(|(m, welded)| m.map(|_| *welded)).collect();
+    // Tags begin with 1.
+    let chart = |tag: &i64| tag.checked_sub(1).and_then(|c| u32::try_from(c).ok()).unwrap_or(u32::MAX);
+    Mesh {
+        triangulation: Triangulation { triangles: triangles.to_vec(), points: welded.points },
+        mids,
+        charts: patches.surfaces().map(|tags| tags.iter().map(chart).collect()),
+    }
+}
+
+/// Puts the report beside that of the result, whole or not at all.
+fn keep(folder: &Path, report: &MeshReport) -> std::io::Result<()> {
+    let mut text = serde_json::to_string_pretty(report)?;
+    text.push('\n');
+    let mut file = tempfile::Builder::new().prefix(".mesh.json-").tempfile_in(folder)?;
+    file.write_all(text.as_bytes())?;
+    file.as_file().sync_all()?;
+    file.persist(folder.join(FILE)).map_err(|e| e.error)?;
+    Ok(())
+}
+
+/// What was found, for people.
+fn text(name: &str, report: &MeshReport) -> String {
+    let verdict = match (report.faithful, report.fine) {
+        (true, true) => "faithful and fine",
+        (true, false) => "faithful, not fine",
+        (false, true) => "NOT FAITHFUL (its elements are fine)",
+        (false, false) => "NOT FAITHFUL, and not fine",
+    };
+    let by = if report.by_charts {
+        "chart by chart, through its maps"
+    } else {
+        "by the surface alone: the file tells no charts"
+    };
+    let mut lines = vec![format!("{name}: {verdict}; judged {by}")];
+    lines.extend(report.defects.iter().map(|d| format!("  {}{}", d.message, located(d.at))));
+    let (gamma, edges) = (report.gamma, report.edges);
+    let curved =
+        if report.curved_elements > 0 { format!(", {} of six nodes", report.curved_elements) } else { String::new() };
+    lines.push(format!("  elements  {}{curved}; area {:.4} of the surface's", report.elements, report.area_ratio));
+    lines.push(format!(
+        "  distance  nodes off the surface by {:.2e} at most; surface off the mesh by {:.3} edge lengths at most",
+        report.mesh_to_surface.distance,
+        report.surface_to_mesh.distance / report.size
+    ));
+    let tips = match gamma.below_at_tips {
+        0 => String::new(),
+        n => format!(", and {n} in tips of the surface, which do not count"),
+    };
+    lines.push(format!(
+        "  gamma     {:.4} at least, {:.3} on average; {} below {}{tips}",
+        gamma.min, gamma.mean, gamma.below, report.min_gamma
+    ));
+    lines.push(format!(
+        "  edges     {:.3} to {:.3} of the size {:.4e}, median {:.3}; {:.1} % within half and twice",
+        edges.min,
+        edges.max,
+        report.size,
+        edges.median,
+        100.0 * edges.near_size
+    ));
+    if report.crossings_of_surface > 0 {
+        lines.push(format!("  {} pairs of elements cross as those of the surface do", report.crossings_of_surface));
+    }
+    if !report.places.is_empty() {
+        lines.push(format!("  worst places (at most {PLACES}):"));
+        lines.extend(report.places.iter().map(|p| format!("   {} {}", located(Some(p.at)), p.what)));
+    }
+    lines.join("\n")
+}
+
+fn located(at: Option<[f64; 3]>) -> String {
+    at.map_or(String::new(), |[x, y, z]| format!(" at ({x:.6}, {y:.6}, {z:.6})"))
+}
