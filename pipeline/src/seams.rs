@@ -11,6 +11,8 @@
 
 mod distance;
 
+pub(crate) use distance::segment_distance;
+
 use crate::atlas::Chart;
 use crate::id::{ChartId, CurveId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;

@@ -125,7 +125,7 @@ fn gap(a: &BoundingBox, b: &BoundingBox) -> f64 {
 }
 
 /// The squared distance of two segments (Ericson 2005, *Real-time collision detection*, section 5.1.9).
-fn segment_distance(p: [Vec3; 2], q: [Vec3; 2]) -> f64 {
+pub(crate) fn segment_distance(p: [Vec3; 2], q: [Vec3; 2]) -> f64 {
     let (d, e, r) = (sub(p[1], p[0]), sub(q[1], q[0]), sub(p[0], q[0]));
     let (dd, ee, de) = (dot(d, d), dot(e, e), dot(d, e));
     let (dr, er) = (dot(d, r), dot(e, r));

@@ -7,7 +7,8 @@
 //! the plane of its map shows them.
 
 use super::reference::Triangulation;
-use crate::evaluate::Bvh;
+use crate::evaluate::{Bvh, on_triangle};
+use crate::seams::segment_distance;
 use crate::space::{BoundingBox, Vec3, cross, dot, sub};
 
 /// The error of the volume of six doubles, relative to the sum of the absolute values of its terms.
@@ -26,8 +27,9 @@ pub struct Crossings {
     pub in_surface: usize,
 }
 
-/// Finds the pairs of triangles of `mesh` that cross where no triangles of `surface` do.
-pub fn crossings(mesh: &Triangulation, surface: &Triangulation, surface_bvh: &Bvh) -> Crossings {
+/// Finds the pairs of triangles of `mesh` that cross where no triangles of `surface` cross or come closer than `contact`:
+/// where parts of an assembly touch, flat elements of both sides cross however small they are.
+pub fn crossings(mesh: &Triangulation, surface: &Triangulation, surface_bvh: &Bvh, contact: f64) -> Crossings {
     let mut pairs = Vec::new();
     mesh.bvh().pairs(|a, b| {
         if cross_each_other(mesh, a, b) {
@@ -37,7 +39,7 @@ pub fn crossings(mesh: &Triangulation, surface: &Triangulation, surface_bvh: &Bv
     let mut found = Crossings::default();
     for (i, pair) in pairs.into_iter().enumerate() {
         // Beyond the bound a crossing counts: it is the mesh that is suspect.
-        if i < LOOKED_AT && surface_crosses(mesh, pair, surface, surface_bvh) {
+        if i < LOOKED_AT && surface_crosses(mesh, pair, surface, surface_bvh, contact) {
             found.in_surface += 1;
         } else {
             found.pairs.push(pair);
@@ -46,8 +48,8 @@ pub fn crossings(mesh: &Triangulation, surface: &Triangulation, surface_bvh: &Bv
     found
 }
 
-/// Whether triangles of the surface cross within the boxes of two crossing triangles of the mesh.
-fn surface_crosses(mesh: &Triangulation, pair: [u32; 2], surface: &Triangulation, bvh: &Bvh) -> bool {
+/// Whether triangles of the surface cross or touch within the boxes of two crossing triangles of the mesh.
+fn surface_crosses(mesh: &Triangulation, pair: [u32; 2], surface: &Triangulation, bvh: &Bvh, contact: f64) -> bool {
     let near = pair.map(|t| {
         let mut near = Vec::new();
         let around = BoundingBox::of(mesh.corners(t as usize));
@@ -55,7 +57,22 @@ fn surface_crosses(mesh: &Triangulation, pair: [u32; 2], surface: &Triangulation
         near.truncate(NEIGHBOURS);
         near
     });
-    near[0].iter().any(|s| near[1].iter().any(|t| s != t && cross_each_other(surface, *s, *t)))
+    let meet = |s: u32, t: u32| cross_each_other(surface, s, t) || touch(surface, s, t, contact);
+    near[0].iter().any(|s| near[1].iter().any(|t| s != t && meet(*s, *t)))
+}
+
+/// Whether two triangles that share no vertex have corners or sides that are closer than `contact` to each other.
+fn touch(surface: &Triangulation, a: u32, b: u32, contact: f64) -> bool {
+    let [s, t] = [a, b].map(|i| surface.triangles[i as usize]);
+    if s.iter().any(|v| t.contains(v)) {
+        return false;
+    }
+    let [p, q] = [a, b].map(|i| surface.corners(i as usize));
+    let limit = contact * contact;
+    let corner = |p: [Vec3; 3], q: [Vec3; 3]| p.iter().any(|x| on_triangle(*x, q).squared <= limit);
+    let side = |p: [Vec3; 3], k: usize| [p[k], p[(k + 1) % 3]];
+    let sides = || (0..9).any(|k| segment_distance(side(p, k / 3), side(q, k % 3)) <= limit);
+    corner(p, q) || corner(q, p) || sides()
 }
 
 /// Whether two triangles cross.
@@ -113,7 +130,7 @@ mod tests {
     #[test]
     fn what_passes_through_crosses_and_what_touches_does_not() {
         let none = mesh(&[]);
-        let count = |other: [Vec3; 3]| crossings(&mesh(&[FLAT, other]), &none, &none.bvh()).pairs.len();
+        let count = |other: [Vec3; 3]| crossings(&mesh(&[FLAT, other]), &none, &none.bvh(), 0.0).pairs.len();
         assert_eq!(count([[0.5, 0.5, -1.0], [0.5, 0.5, 1.0], [5.0, 5.0, 0.0]]), 1);
         assert_eq!(count([[0.0; 3], [0.9, 0.6, -1.0], [0.6, 0.9, 1.0]]), 1, "through a shared node");
         assert_eq!(count([[0.0; 3], [-0.5, -0.5, -1.0], [-0.6, -0.9, 1.0]]), 0);
@@ -126,7 +143,12 @@ mod tests {
     fn what_the_surface_has_is_not_held_against_the_mesh() {
         let through = [[0.5, 0.5, -1.0], [0.5, 0.5, 1.0], [5.0, 5.0, 0.0]];
         let both = mesh(&[FLAT, through]);
-        let found = crossings(&both, &both, &both.bvh());
+        let found = crossings(&both, &both, &both.bvh(), 0.0);
         assert_eq!((found.pairs.len(), found.in_surface), (0, 1));
+        // Parts that touch: a corner on a triangle.
+        let touching = mesh(&[FLAT, [[0.5, 0.5, 0.0], [0.5, 0.6, 1.0], [5.0, 5.0, 0.5]]]);
+        assert_eq!(crossings(&both, &touching, &touching.bvh(), 1e-9).pairs.len(), 0);
+        let apart = mesh(&[FLAT, [[0.5, 0.5, 0.1], [0.5, 0.6, 1.0], [5.0, 5.0, 0.5]]]);
+        assert_eq!(crossings(&both, &apart, &apart.bvh(), 1e-9).pairs.len(), 1);
     }
 }

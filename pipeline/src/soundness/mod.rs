@@ -277,7 +277,7 @@ pub struct Findings {
     pub mesh_to_surface: Farthest,
     /// The largest distance of a point of the surface to the mesh.
     pub surface_to_mesh: Farthest,
-    /// Pairs of triangles that cross as those of the surface do.
+    /// Pairs of triangles that cross where those of the surface cross or touch.
     pub crossings_of_surface: usize,
     /// The least gamma.
     pub gamma_min: f64,
@@ -343,7 +343,7 @@ pub fn examine(
     }
     let area_ratio = triangulation.area() / surface.area();
     defects.extend(area_defects(mesh, surface, charts, area_ratio, settings.size));
-    let crossings = intersect::crossings(triangulation, surface, &surface_bvh);
+    let crossings = intersect::crossings(triangulation, surface, &surface_bvh, settings.off_surface * diagonal);
     let at = |t: u32| centroid(triangulation.corners(t as usize));
     defects.extend(crossings.pairs.first().map(|p| Defect::Crossing { pairs: crossings.pairs.len(), at: at(p[0]) }));
     let inverted = elements::invalid_curved(mesh);
@@ -457,3 +457,6 @@ fn area_defects(mesh: &Mesh, surface: &Triangulation, charts: &[u32], ratio: f64
 fn centroid(p: [Vec3; 3]) -> Vec3 {
     [0, 1, 2].map(|k| (p[0][k] + p[1][k] + p[2][k]) / 3.0)
 }
+
+#[cfg(test)]
+mod tests;

@@ -80,7 +80,6 @@ Mesh.MeshSizeMin = {least}size{times};
 Mesh.MeshSizeMax = size{times};
 Mesh.MeshSizeExtendFromBoundary = 0;
 Mesh.MeshSizeFromPoints = 0;
-Mesh.Smoothing = 5;
 // Mesh.MeshSizeFromCurvature = 20;
 {fields}
 // 6 (Frontal-Delaunay) makes the better triangles, 5 (Delaunay) is many times faster where there are many of them;
