@@ -2,7 +2,8 @@
 //!
 //! 1. Vertices with bit-equal coordinates are merged (the sign of zero does not count).
 //! 2. Triangles with two equal vertices, and copies of a triangle, are dropped. Slivers stay.
-//! 3. Cracks are closed: open edges that run side by side within a tolerance (see [`Settings::weld`]).
+//! 3. T-junctions are closed: triangles are split where vertices of another side lie on their open edges. Then cracks are:
+//!    open edges that run side by side within a tolerance (see [`Settings::weld`]).
 //! 4. Every orientable component is oriented like the majority of its triangles.
 //! 5. The surface is split along non-manifold edges, and where sheets only touch in a vertex: every sheet gets
 //!    vertices of its own.
@@ -13,11 +14,14 @@
 //! boundary: both have to become seams. What cannot be a surface at all (no triangle is left) is refused.
 
 mod cracks;
+mod near;
+mod t_junctions;
 mod weld;
 
 use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::{Census, EdgeTable, Metric, SurfaceMesh, TriangleSoup, Umbrellas};
 use crate::space::{BoundingBox, Vec3, unit_scale};
+use t_junctions::Boundary;
 
 /// What repair may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,6 +70,10 @@ pub struct Report {
     pub welded: usize,
     /// Points that no triangle uses.
     pub unreferenced_points: usize,
+    /// Vertices (after welding) that lay on open edges of other triangles, which were split there.
+    pub t_junctions_closed: Found,
+    /// Vertices (after welding) on the boundary that lie on an open edge still.
+    pub t_junctions_left: Found,
     /// Pairs of open edges joined.
     pub cracks_closed: usize,
     /// Copies of a triangle, removed.
@@ -113,6 +121,12 @@ struct Draft {
     source: Vec<u32>,
 }
 
+/// The points of a draft in a unit in which distances neither overflow nor underflow, and the tolerance in that unit.
+struct Measure {
+    points: Vec<Vec3>,
+    tolerance: f64,
+}
+
 /// Repairs `soup`. The result depends on the order of the input only through its numbering.
 ///
 /// # Errors
@@ -130,9 +144,17 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     report.unreferenced_points = draft.points.len() - used;
     report.duplicate_triangles = draft.drop_duplicates();
     edges = renewed(edges, report.duplicate_triangles.count > 0, &draft.triangles);
-    draft.close_cracks(&edges, settings.weld, &mut report);
-    edges = renewed(edges, report.cracks_closed > 0, &draft.triangles);
-    let as_counted = report.duplicate_triangles.count == 0 && report.cracks_closed == 0;
+    let measure = draft.measure(settings.weld);
+    report.t_junctions_closed = draft.close_t_junctions(&edges, &measure);
+    let split = report.t_junctions_closed.count > 0;
+    edges = renewed(edges, split, &draft.triangles);
+    let copies = report.duplicate_triangles.count;
+    draft.close_cracks(&edges, &measure, &mut report);
+    let changed = report.cracks_closed > 0 || report.duplicate_triangles.count > copies;
+    edges = renewed(edges, changed, &draft.triangles);
+    report.t_junctions_left = draft.t_junctions_left(&edges, &measure);
+    drop(measure);
+    let as_counted = report.duplicate_triangles.count == 0 && report.cracks_closed == 0 && !split;
     if !as_counted || raw.inconsistent_edges > 0 {
         report.flipped_triangles = draft.orient(&edges);
         edges = renewed(edges, report.flipped_triangles.count > 0, &draft.triangles);
@@ -184,18 +206,52 @@ impl Draft {
         dropped
     }
 
-    /// Joins open edges within `weld` of each other, then drops what became a copy.
-    fn close_cracks(&mut self, edges: &EdgeTable, weld: f64, report: &mut Report) {
-        let Some(diagonal) = BoundingBox::of(self.used_points()).map(|b| b.diagonal()) else { return };
-        // Powers of two change no digit: distances are measured where they neither overflow nor underflow.
+    /// Makes distances comparable with `weld` of the diagonal.
+    fn measure(&self, weld: f64) -> Measure {
+        let diagonal = BoundingBox::of(self.used_points()).map_or(0.0, |b| b.diagonal());
+        // Powers of two change no digit.
         let scale = unit_scale(diagonal);
-        let scaled: Vec<Vec3> = self.points.iter().map(|p| p.map(|c| c * scale)).collect();
-        let closed = cracks::find(&scaled, &self.triangles, edges, weld * diagonal * scale);
+        let points = self.points.iter().map(|p| p.map(|c| c * scale)).collect();
+        Measure { points, tolerance: weld * diagonal * scale }
+    }
+
+    /// Splits triangles where vertices of others lie on their open edges; returns these vertices.
+    fn close_t_junctions(&mut self, edges: &EdgeTable, measure: &Measure) -> Found {
+        let splits = Boundary::new(&measure.points, &self.triangles, edges, measure.tolerance).splits();
+        let mut closed: Vec<VertexId> = splits.iter().flat_map(|s| s.1.iter().copied()).collect();
+        closed.sort_unstable();
+        closed.dedup();
+        for of_face in splits.chunk_by(|g, h| g.0.face() == h.0.face()) {
+            let mut on_sides = [const { Vec::new() }; 3];
+            of_face.iter().for_each(|(h, vertices)| on_sides[h.side()].clone_from(vertices));
+            self.split(of_face[0].0.face().index(), &on_sides);
+        }
+        Found::of(closed.into_iter().map(|v| v.0))
+    }
+
+    /// Puts the parts of a triangle at its place and at the end.
+    fn split(&mut self, face: usize, on_sides: &[Vec<VertexId>; 3]) {
+        let parts = t_junctions::parts(self.triangles[face], on_sides);
+        self.triangles[face] = parts[0];
+        self.source.extend(vec![self.source[face]; parts.len() - 1]);
+        self.triangles.extend_from_slice(&parts[1..]);
+    }
+
+    /// The boundary vertices that lie on a boundary edge.
+    fn t_junctions_left(&self, edges: &EdgeTable, measure: &Measure) -> Found {
+        let left = Boundary::new(&measure.points, &self.triangles, edges, measure.tolerance).vertices_on_edges();
+        Found::of(left.into_iter().map(|v| v.0))
+    }
+
+    /// Joins open edges within the tolerance of each other, then drops what became a copy.
+    fn close_cracks(&mut self, edges: &EdgeTable, measure: &Measure, report: &mut Report) {
+        let closed = cracks::find(&measure.points, &self.triangles, edges, measure.tolerance);
         report.cracks_closed = closed.pairs;
-        if closed.pairs == 0 {
+        if closed.pairs > 0 {
+            self.triangles.iter_mut().for_each(|t| *t = t.map(|v| closed.target[v.index()]));
+        } else if report.t_junctions_closed.count == 0 {
             return;
         }
-        self.triangles.iter_mut().for_each(|t| *t = t.map(|v| closed.target[v.index()]));
         let copies = self.drop_duplicates();
         report.duplicate_triangles.count += copies.count;
         report.duplicate_triangles.first.extend(copies.first);
