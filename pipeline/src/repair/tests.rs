@@ -333,3 +333,31 @@ fn a_fine_rim_between_two_walls_does_not_join_them() {
     assert_eq!(got.report.t_junctions_left.count, 2);
     assert!(repaired(&fans(&[wall(2e-7), rim])).mesh.census().is_one_chart());
 }
+
+/// The faces of all tetrahedra in a grid of n cubes each way, six in each (Kuhn's).
+fn faces_of_tetrahedra(n: u32) -> TriangleSoup {
+    let side = n + 1;
+    let point = |i: u32| [i % side, i / side % side, i / side / side].map(f64::from);
+    let steps = [1, side, side * side];
+    let mut faces = std::collections::BTreeSet::new();
+    for cube in (0..n * n * n).map(|i| i % n + side * (i / n % n) + side * side * (i / n / n)) {
+        for [x, y, z] in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let [a, b, c, d] = [0, steps[x], steps[x] + steps[y], steps[x] + steps[y] + steps[z]].map(|s| cube + s);
+            faces.extend([[a, b, c], [a, b, d], [a, c, d], [b, c, d]]);
+        }
+    }
+    TriangleSoup::new((0..side * side * side).map(point).collect(), faces.into_iter().collect()).expect("sound")
+}
+
+#[test]
+fn faces_of_volume_elements_are_refused_and_a_few_sheets_are_not() {
+    let refused = repaired(&faces_of_tetrahedra(16)).check_sheets();
+    let Err(Error::VolumeElements { sheets, triangles, nonmanifold_edges, vertices }) = refused else {
+        panic!("{refused:?}")
+    };
+    assert_eq!((triangles, nonmanifold_edges, vertices.len()), (50_688, 30_928, 8));
+    assert!(sheets > 50_000);
+    for few in [faces_of_tetrahedra(3), shapes::book(40, 20), shapes::sphere(8)] {
+        assert_eq!(repaired(&few).check_sheets(), Ok(()));
+    }
+}
