@@ -51,7 +51,8 @@ fn build(points: &[Vec3], ids: &mut [u32], boxes: &mut [Option<BoundingBox>], no
     let extent = sub(cell.max, cell.min);
     let axis = (0..3).max_by(|i, j| extent[*i].total_cmp(&extent[*j])).unwrap_or_default();
     let middle = ids.len() / 2;
-    let by_coordinate = |i: &u32, j: &u32| points[*i as usize][axis].total_cmp(&points[*j as usize][axis]).then(i.cmp(j));
+    let by_coordinate =
+        |i: &u32, j: &u32| points[*i as usize][axis].total_cmp(&points[*j as usize][axis]).then(i.cmp(j));
     if middle > 0 {
         ids.select_nth_unstable_by(middle, by_coordinate);
     }

@@ -108,7 +108,8 @@ impl<'a> Boundary<'a> {
     pub(super) fn splits(&self) -> Splits {
         let mut placed = self.placed();
         placed.sort_unstable_by_key(|v| (v.vertex, v.edge));
-        let mut kept: Vec<OnEdge> = placed.chunk_by(|v, w| v.vertex == w.vertex).flat_map(|of| self.undisputed(of)).collect();
+        let mut kept: Vec<OnEdge> =
+            placed.chunk_by(|v, w| v.vertex == w.vertex).flat_map(|of| self.undisputed(of)).collect();
         kept.sort_unstable_by(|v, w| {
             v.edge.cmp(&w.edge).then(v.along.total_cmp(&w.along)).then(v.vertex.cmp(&w.vertex))
         });
@@ -181,7 +182,12 @@ impl<'a> Boundary<'a> {
     fn on_edge(&self, h: HalfEdgeId, line: &Line, vertex: VertexId) -> Option<OnEdge> {
         let (along, off) = line.foot(self.point(vertex));
         let inside = along > self.tolerance && along < line.length - self.tolerance && off <= self.tolerance;
-        (inside && !self.triangles[h.face().index()].contains(&vertex)).then_some(OnEdge { vertex, edge: h, along, off })
+        (inside && !self.triangles[h.face().index()].contains(&vertex)).then_some(OnEdge {
+            vertex,
+            edge: h,
+            along,
+            off,
+        })
     }
 
     /// Per vertex the numbers of the boundary edges at it.
@@ -206,7 +212,8 @@ impl<'a> Boundary<'a> {
             let edges = edges_at.get_mut(v.vertex.index());
             *looks = looks.saturating_sub(edges.len());
             let affordable = if *looks == 0 { &mut [] } else { edges };
-            let found: Vec<Beside> = affordable.iter().filter_map(|g| self.runs_along(HalfEdgeId(*g), v, line)).collect();
+            let found: Vec<Beside> =
+                affordable.iter().filter_map(|g| self.runs_along(HalfEdgeId(*g), v, line)).collect();
             runs_along.push(found.iter().any(|b| !faces(b.inward, inward)));
             beside.extend(found);
         }
@@ -221,8 +228,7 @@ impl<'a> Boundary<'a> {
         let end = along.clamp(0.0, line.length);
         let off = if end == along { off } else { off * (end - v.along) / (along - v.along) };
         let span = [v.along.min(end), v.along.max(end)];
-        (off <= self.tolerance && span[1] - span[0] > self.tolerance)
-            .then(|| Beside { span, inward: self.inward(g) })
+        (off <= self.tolerance && span[1] - span[0] > self.tolerance).then(|| Beside { span, inward: self.inward(g) })
     }
 
     /// Whether edges along the edge `h` face it or each other, or are too many to tell.

@@ -281,11 +281,8 @@ fn three_sides_cut_differently_meet_in_non_manifold_edges() {
         page.extend(heights.iter().map(|z| [0.0, 0.0, *z]));
         page
     };
-    let pages = [
-        page(1.0, 0.0, &[0.0, 1.0]),
-        page(-1.0, 0.2, &[0.0, 0.25, 0.5, 1.0]),
-        page(0.0, 1.0, &[0.0, 0.5, 0.75, 1.0]),
-    ];
+    let pages =
+        [page(1.0, 0.0, &[0.0, 1.0]), page(-1.0, 0.2, &[0.0, 0.25, 0.5, 1.0]), page(0.0, 1.0, &[0.0, 0.5, 0.75, 1.0])];
     let got = repaired(&fans(&pages));
     assert_eq!((got.mesh.census().nonmanifold_edges, got.report.t_junctions_left.count), (4, 0), "{:?}", got.report);
     assert_eq!(got.report.t_junctions_closed.count, 3);
@@ -295,7 +292,8 @@ fn three_sides_cut_differently_meet_in_non_manifold_edges() {
 fn walls_of_a_thin_gap_are_not_joined_at_t_junctions_but_told() {
     for gap in [0.0, 1e-7] {
         let upper = vec![[0.0, 0.0, gap], [1.0, 0.0, gap], [0.0, 1.0, gap]];
-        let lower = vec![[0.1, 0.9, 0.0], [0.0, 0.9, 0.0], [0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.6, 0.0, 0.0], [1.0, 0.0, 0.0]];
+        let lower =
+            vec![[0.1, 0.9, 0.0], [0.0, 0.9, 0.0], [0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.6, 0.0, 0.0], [1.0, 0.0, 0.0]];
         let got = repaired(&fans(&[upper, lower]));
         assert_eq!((got.report.t_junctions_closed.count, got.mesh.census().components), (0, 2), "gap {gap}");
         assert!(got.report.t_junctions_left.count >= 2, "{:?}", got.report);
