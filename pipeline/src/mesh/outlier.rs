@@ -62,7 +62,7 @@ mod tests {
 
     /// Heights over a grid; some of them stand for no data.
     fn terrain(no_data: f64, holes: usize) -> Vec<Vec3> {
-        let height = |i: usize| if i % 7 == 0 && i / 7 < holes { no_data } else { 600.0 + (i as f64).sin() };
+        let height = |i: usize| if i.is_multiple_of(7) && i / 7 < holes { no_data } else { 600.0 + (i as f64).sin() };
         (0..100).map(|i| [(i % 10) as f64, (i / 10) as f64, height(i)]).collect()
     }
 

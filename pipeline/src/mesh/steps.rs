@@ -1,7 +1,7 @@
 //! Steps: how finely 32-bit coordinates tell where a vertex is.
 //!
 //! STL holds numbers of 32 bits: 24 binary digits, from the largest coordinate down. Far from the origin little of that
-//! is left for the surface: at 5,000,000 (metres, say, of a map's northing) coordinates lie in steps of 0.5. Whether
+//! is left for the surface: at 5,000,000 (a northing in metres, say) coordinates lie in steps of 0.5. Whether
 //! numbers were rounded is seen from them: all are 32-bit numbers, and some are odd multiples of the step, or finer. Those
 //! that lie in wider steps (whole numbers, a grid) lost nothing.
 
@@ -11,8 +11,8 @@ use crate::space::{Vec3, distance};
 /// Edges below this many steps are short: the direction of one of four steps is known to 1 in 4 at best.
 pub const FEW_STEPS: f64 = 4.0;
 
-/// Steps are coarse where this share of the edges is short. The terrain of CASES.tsv decided it: half of its edges are;
-/// of the scans and CAD surfaces at hand that lie near the origin, none has any.
+/// Steps are coarse where this share of the edges is short. A terrain in metres of a map decided it: half of its edges are; no
+/// surface at hand that lies near the origin comes near it.
 const MANY: f64 = 0.1;
 
 /// The steps in which coordinates lie, and the edges that are short beside them.
