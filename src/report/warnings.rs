@@ -97,9 +97,15 @@ fn value_apart(found: &ValueApart) -> String {
     )
 }
 
-/// A coordinate as people write it.
+/// A coordinate as people write it: with the digits of 32 bits where it has no more.
 fn plain(value: f64) -> String {
-    if value == 0.0 || (1e-3..1e7).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
+    let is_usual = value == 0.0 || (1e-3..1e7).contains(&value.abs());
+    match (value as f32, is_usual) {
+        (short, true) if f64::from(short) == value => short.to_string(),
+        (short, false) if f64::from(short) == value => format!("{short:e}"),
+        (_, true) => value.to_string(),
+        (_, false) => format!("{value:e}"),
+    }
 }
 
 fn all_mollified(mollified: usize, triangles: usize) -> String {
@@ -153,6 +159,7 @@ mod tests {
     fn messages_name_the_value_and_the_step() {
         let value = ValueApart { axis: 2, value: -32768.0, vertices: 37, others: [557.5, 644.75] };
         assert!(value_apart(&value).starts_with("z is -32768 at 37 vertices and from 557.5 to 644.75 at all others"));
+        assert_eq!([f64::from(1e20_f32), 1e20, 0.1, 0.0].map(plain), ["1e20", "1e20", "0.1", "0"]);
         let steps = CoordinateSteps { step: [0.0, 0.5, 0.0], short_edges: 7, edges: 9 };
         assert!(coarse_coordinates(&steps).starts_with("coordinates lie in steps of 0.5 along y"));
     }

@@ -1,6 +1,6 @@
 //! Steps: how finely 32-bit coordinates tell where a vertex is.
 //!
-//! STL holds numbers of 32 bits: 24 binary digits, from the largest coordinate down. Far from the origin little of that
+//! STL holds numbers of 32 bits: 24 binary digits each. Far from the origin little of that
 //! is left for the surface: at 5,000,000 (a northing in metres, say) coordinates lie in steps of 0.5. Whether
 //! numbers were rounded is seen from them: all are 32-bit numbers, and some are odd multiples of the step, or finer. Those
 //! that lie in wider steps (whole numbers, a grid) lost nothing.
@@ -63,10 +63,16 @@ fn steps(points: &[Vec3]) -> Option<Vec3> {
     (step != [0.0; 3]).then_some(step)
 }
 
-/// The distance of neighbouring 32-bit numbers at the largest coordinate along an axis, unless all are even multiples of it.
+/// The distance of neighbouring 32-bit numbers at the median of the coordinates along an axis, unless all are even multiples
+/// of it. Not at the largest one: a single vertex far away rounds no other.
 fn step(points: &[Vec3], axis: usize) -> f64 {
-    let largest = points.iter().map(|p| p[axis].abs()).fold(0.0, f64::max) as f32;
-    let step = f64::from(largest.next_up()) - f64::from(largest);
+    let mut sizes: Vec<f32> = points.iter().map(|p| p[axis].abs() as f32).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() {
+        return 0.0;
+    }
+    let median = *sizes.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let step = f64::from(median.next_up()) - f64::from(median);
     let is_rounded = step.is_finite() && points.iter().any(|p| p[axis] % (2.0 * step) != 0.0);
     if is_rounded { step } else { 0.0 }
 }
@@ -87,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_those_of_the_largest_coordinate_where_edges_are_short() {
+    fn steps_are_those_of_the_coordinates_where_edges_are_short() {
         let far = disk_at([400_000.0, 5_000_000.0, 600.0]).coarse_steps().expect("coarse");
         assert_eq!((far.largest(), far.axis(), far.step[0]), (0.5, 1, 0.03125));
         assert!(far.short_edges > far.edges / 2);
@@ -106,5 +112,8 @@ mod tests {
         assert_eq!(flat(5_000_000.0, 1.0), None, "whole numbers of 32 bits");
         assert_eq!(flat(5_000_000.0, 0.1), None, "doubles");
         assert_eq!(flat(5_000_000.0, 0.5), Some([0.5, 0.5, 0.0]));
+        let mut peak: Vec<Vec3> = (0..9).map(|i| [f64::from(i), 0.5, 0.25]).collect();
+        peak.push([1e20_f32.into(), 0.5, 0.25]);
+        assert!(steps(&peak).is_none_or(|s| s.iter().all(|s| *s < 1e-6)), "one vertex far away");
     }
 }

@@ -119,6 +119,9 @@ impl<'a> Boundary<'a> {
 
     /// The vertices on edges along which they run, without facing them; at most so many times each.
     fn placed(&self) -> Vec<OnEdge> {
+        if self.open.is_empty() {
+            return Vec::new();
+        }
         let mut edges_at = self.edges_at_vertices();
         let mut times = vec![0; self.points.len()];
         let mut placed = Vec::new();
