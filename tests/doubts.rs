@@ -60,9 +60,7 @@ fn a_cube_with_a_finer_top_is_closed() {
     assert_eq!((ended.code, report.status, doubts(&report)), (Some(0), Status::Certified, vec![]), "{}", ended.err);
     let (counts, repairs) = (report.surface.expect("counted").repaired.counts, report.repairs.expect("told"));
     assert_eq!((counts.components, counts.boundary_loops, counts.euler), (1, 0, 2));
-    assert_eq!((repairs.t_junctions_closed, repairs.t_junctions_left), (4, 0));
-    let proven = planish(["check".as_ref(), out.of("cube.stl").as_os_str()]);
-    assert_eq!(proven.code, Some(0), "{}", proven.err);
+    assert_eq!((repairs.t_junctions_closed, repairs.t_junctions_left, repairs.triangles_added), (4, 0, 4));
     let (_, open) = out.run_bytes("open.stl", &stl(&cube_with_finer_top(1e-4)));
     assert_eq!(open.surface.expect("counted").repaired.counts.boundary_loops, 2);
 }
@@ -76,7 +74,7 @@ fn a_terrain_in_coarse_coordinates_is_told_and_stays_in_a_few_charts() {
     assert!(ended.err.contains("steps of 0.5 along y") && ended.err.contains("local origin"), "{}", ended.err);
     assert!(!ended.err.contains("--size 0"), "{}", ended.err);
     let (_, near) = out.run_bytes("near.stl", &stl(&terrain([0.0; 2], hills)));
-    assert_eq!((near.charts.len(), doubts(&near)), (1, vec![]));
+    assert!(near.charts.len() <= 3 && doubts(&near).is_empty(), "{:?}", near.warnings);
 }
 
 #[test]

@@ -58,6 +58,7 @@ pub fn repairs(report: &repair::Report) -> Repairs {
         unreferenced_points: report.unreferenced_points,
         t_junctions_closed: report.t_junctions_closed.count,
         t_junctions_left: report.t_junctions_left.count,
+        triangles_added: report.triangles_added,
         cracks_closed: report.cracks_closed,
         duplicate_triangles: report.duplicate_triangles.count,
         degenerate_triangles: report.degenerate_triangles.count,

@@ -178,6 +178,9 @@ pub struct Repairs {
     /// Vertices on the boundary that lie on an open edge still.
     #[serde(default)]
     pub t_junctions_left: usize,
+    /// Triangles of the surface beyond one for each of the input: parts of those that were split.
+    #[serde(default)]
+    pub triangles_added: usize,
     /// Pairs of open edges joined.
     pub cracks_closed: usize,
     /// Copies of a triangle, removed.

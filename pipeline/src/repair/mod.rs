@@ -76,6 +76,8 @@ pub struct Report {
     pub t_junctions_closed: Found,
     /// Vertices (after welding) on the boundary that lie on an open edge still.
     pub t_junctions_left: Found,
+    /// Triangles of the surface beyond one for each of the input: parts of those that were split.
+    pub triangles_added: usize,
     /// Pairs of open edges joined.
     pub cracks_closed: usize,
     /// Copies of a triangle, removed.
@@ -205,6 +207,7 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
         report.flipped_triangles = draft.orient(&edges);
         edges = renewed(edges, report.flipped_triangles.count > 0, &draft.triangles);
     }
+    report.triangles_added = if split { draft.count_added() } else { 0 };
     let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0);
     let mesh = draft.into_mesh(edges, known, &mut report);
     // As read: vertices of degenerate triangles count, though these do not.
@@ -222,6 +225,14 @@ impl Draft {
         let mut used = vec![false; self.points.len()];
         self.triangles.iter().flatten().for_each(|v| used[v.index()] = true);
         used.iter().filter(|u| **u).count()
+    }
+
+    /// The number of triangles beyond one for each of the input.
+    fn count_added(&self) -> usize {
+        let mut sources = self.source.clone();
+        sources.sort_unstable();
+        sources.dedup();
+        self.triangles.len() - sources.len()
     }
 
     /// Removes triangles with two equal vertices.
