@@ -104,7 +104,11 @@ pub struct Making {
     /// of the same area, but at most 1/50 of the bounding box's diagonal]
     #[arg(long, value_name = "H")]
     pub size: Option<f64>,
-    /// Edges with a dihedral angle above DEG degrees are features, along which charts end; off: none are [default: 40]
+    /// Edges with a dihedral angle above DEG degrees, and those above 5/8 of it that continue them, are features, along
+    /// which charts end; off: none are [default: 40]. Passed over are creases that part nothing (they run out) or are
+    /// short; those around patches too small for a face, the sooner the blunter they are, and blunt ones around narrow
+    /// bevels; and angles that only single triangles have (raw noise: angles are measured over some triangles on either
+    /// side), or that rounding of the coordinates may have made
     #[arg(long, value_name = "DEG|off")]
     pub feature_angle: Option<FeatureAngle>,
     /// Let holes of charts be holes of the surface only
@@ -183,7 +187,8 @@ pub struct Info {
 /// Options of the verbs that read meshes.
 #[derive(Debug, Default, Args)]
 pub struct Reading {
-    /// Close cracks narrower than REL times the bounding box's diagonal [default: 1e-6]
+    /// Close cracks narrower than REL times the bounding box's diagonal, and T-junctions: vertices no farther than that from
+    /// an open edge of another side [default: 1e-6]
     #[arg(long, value_name = "REL")]
     pub weld: Option<f64>,
 }

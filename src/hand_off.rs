@@ -4,6 +4,7 @@ use crate::formats::gmsh;
 use crate::report::HandOff;
 use pipeline::CertifiedChart;
 use pipeline::atlas::Chart;
+use pipeline::evaluate::Plane;
 use pipeline::id::{ChartId, CurveId, FaceId};
 use pipeline::mesh::SurfaceMesh;
 use pipeline::seams::SeamNetwork;
@@ -101,8 +102,14 @@ fn narrow(charts: &[Chart], network: &SeamNetwork, size: f64) -> Vec<gmsh::Narro
 
 /// MeshAdapt where maps stretch, in a unit in which it searches little more than a tenth of an edge around a point.
 fn algorithms(linear: &LinearAtlas, conformal_p99: &[f64], size: f64) -> gmsh::Algorithms {
-    let is_linear = |c: usize| linear.linear_charts().contains(&ChartId::at(c));
-    let is_adapted = |c: &usize| conformal_p99[*c] > STRETCHED || is_linear(*c);
+    let stretches = |c: usize| conformal_p99[c] > STRETCHED || linear.linear_charts().contains(&ChartId::at(c));
+    // Gmsh takes the plane of flat charts for their map.
+    let is_flat = |c: usize| {
+        let chart = &linear.charts()[c];
+        let points: Vec<_> = chart.nodes().iter().map(|n| linear.points()[*n as usize]).collect();
+        Plane::of(&points, chart.triangles()).is_some()
+    };
+    let is_adapted = |c: &usize| stretches(*c) && !is_flat(*c);
     let adapted: Vec<usize> = (0..conformal_p99.len()).filter(is_adapted).collect();
     let needed = !adapted.is_empty() && size < 10.0 * SEARCHED;
     gmsh::Algorithms { adapted, enlarged: if needed { 2.0 * unit_scale(size) } else { 1.0 } }
@@ -149,11 +156,17 @@ pub fn default_size(mesh: &SurfaceMesh) -> f64 {
     if edge > 0.0 { edge.min(coarsest) } else { coarsest }
 }
 
+/// What may go wrong, and what helps: an edge length only where it is one that `--size` takes.
 fn too_coarse(size: f64, distance: f64) -> String {
+    let fine = 0.499 * distance;
+    let remedy = if fine.is_normal() {
+        format!("give --size {fine:.4e} or less")
+    } else {
+        "no edge length helps where seams touch; see the warnings about the surface, and repair it there".to_owned()
+    };
     format!(
         "the edge length {size:.4e} is more than half the shortest distance between two seams of a chart \
-         ({distance:.4e}): triangles of neighbouring charts may come to lie on each other; give --size {:.4e} or less",
-        0.499 * distance
+         ({distance:.4e}): triangles of neighbouring charts may come to lie on each other; {remedy}"
     )
 }
 
@@ -170,4 +183,22 @@ fn failure(error: &subdivide::Error, mesh: &SurfaceMesh, charts: &[Chart]) -> St
         subdivide::Error::MeetsItself { .. } | subdivide::Error::Pinched { .. } => String::new(),
     };
     format!("{error}{place}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Said;
+
+    #[test]
+    fn an_edge_length_is_advised_only_where_it_is_taken() {
+        for distance in [3.7, 1e-9, 4.5e-308, 1e-320, 0.0] {
+            let message = too_coarse(10.0, distance);
+            let advised = message.split_once("--size ").and_then(|(_, rest)| rest.split(' ').next());
+            let size: Option<f64> = advised.map(|a| a.parse().expect("a number"));
+            assert!(size.is_none_or(|s| s < 0.5 * distance), "{message}");
+            assert!(Said { size, ..Said::default() }.check().is_ok(), "{message}");
+            assert_eq!(size.is_some(), distance > 1e-310, "{message}");
+        }
+    }
 }

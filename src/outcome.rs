@@ -53,6 +53,8 @@ pub enum Code {
     NoTriangles,
     /// Every triangle has two equal vertices.
     OnlyDegenerate,
+    /// Non-manifold edges cut the surface into thousands of sheets: faces of volume elements.
+    VolumeElements,
     /// More elements than planish can number.
     TooLarge,
     /// The surface is not one disk: given by earlier versions only, and read in their reports.

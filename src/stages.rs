@@ -156,7 +156,24 @@ impl Beside for Folder<'_> {
 /// The refusal, where nothing is left.
 pub fn repaired(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Reason> {
     let found = repair(soup, &pipeline::repair::Settings { weld: settings.weld });
-    found.map_err(|e| Reason::new(Code::OnlyDegenerate, e))
+    found.map_err(|e| not_repaired(&e))
+}
+
+fn not_repaired(error: &repair::Error) -> Reason {
+    match error {
+        repair::Error::OnlyDegenerate { .. } => Reason::new(Code::OnlyDegenerate, error),
+        repair::Error::VolumeElements { vertices, .. } => {
+            Reason::at(Code::VolumeElements, error, Some(format!("vertices {vertices:?} after welding")))
+        }
+    }
+}
+
+/// Whether an atlas can be made of a surface.
+///
+/// # Errors
+/// The refusal of faces of volume elements.
+pub fn check_sheets(found: &Repaired) -> Result<(), Reason> {
+    found.check_sheets().map_err(|e| not_repaired(&e))
 }
 
 /// Repairs a soup and cuts it into charts; completes the report.
@@ -174,6 +191,9 @@ pub fn cut(
     drop(soup);
     report.surface = Some(report::surface(&found));
     report.repairs = Some(report::repairs(&found.report));
+    report.warnings = report::warnings(&found);
+    report.warnings.iter().for_each(|w| tracing::warn!("{}", w.message));
+    check_sheets(&found)?;
     let atlas = pipeline::decompose(&found.mesh, &settings.decompose(), host).map_err(not_cut)?;
     let feature_edges = atlas.feature_edges();
     report.decomposition = Some(Decomposition { feature_edges, ..Decomposition::default() });

@@ -3,6 +3,7 @@
 mod check;
 mod corpus;
 mod daemon;
+mod doubts;
 mod every_mesh;
 mod fixtures;
 mod fuzz;

@@ -44,6 +44,8 @@ fn counts(c: &Census) -> Counts {
 /// What repair did.
 pub fn repairs(report: &repair::Report) -> Repairs {
     let named = [
+        ("t_junctions_closed", &report.t_junctions_closed),
+        ("t_junctions_left", &report.t_junctions_left),
         ("duplicate_triangles", &report.duplicate_triangles),
         ("degenerate_triangles", &report.degenerate_triangles),
         ("flipped_triangles", &report.flipped_triangles),
@@ -54,6 +56,9 @@ pub fn repairs(report: &repair::Report) -> Repairs {
     Repairs {
         welded: report.welded,
         unreferenced_points: report.unreferenced_points,
+        t_junctions_closed: report.t_junctions_closed.count,
+        t_junctions_left: report.t_junctions_left.count,
+        triangles_added: report.triangles_added,
         cracks_closed: report.cracks_closed,
         duplicate_triangles: report.duplicate_triangles.count,
         degenerate_triangles: report.degenerate_triangles.count,

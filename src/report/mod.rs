@@ -3,6 +3,7 @@
 
 mod build;
 pub mod mesh;
+mod warnings;
 
 use crate::formats::Notes;
 use crate::outcome::{Reason, Status};
@@ -12,6 +13,7 @@ pub use build::{certificate, chart_checksum, chart_report, repairs, seams, surfa
 use pipeline::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+pub use warnings::{Doubt, Warning, warnings};
 
 /// The version of the schema.
 pub const SCHEMA: u32 = 1;
@@ -42,6 +44,9 @@ pub struct Report {
     pub refused_components: Vec<RefusedComponent>,
     /// What repair did.
     pub repairs: Option<Repairs>,
+    /// What the surface may suffer from all the same.
+    #[serde(default)]
+    pub warnings: Vec<Warning>,
     /// How the surface was cut into charts.
     pub decomposition: Option<Decomposition>,
     /// The charts.
@@ -168,6 +173,15 @@ pub struct Repairs {
     pub welded: usize,
     /// Points that no triangle uses.
     pub unreferenced_points: usize,
+    /// Vertices that lay on open edges of other triangles, which were split there.
+    #[serde(default)]
+    pub t_junctions_closed: usize,
+    /// Vertices on the boundary that lie on an open edge still.
+    #[serde(default)]
+    pub t_junctions_left: usize,
+    /// Triangles of the surface beyond one for each of the input: parts of those that were split.
+    #[serde(default)]
+    pub triangles_added: usize,
     /// Pairs of open edges joined.
     pub cracks_closed: usize,
     /// Copies of a triangle, removed.
@@ -416,6 +430,7 @@ impl Report {
             surface: None,
             refused_components: vec![],
             repairs: None,
+            warnings: vec![],
             decomposition: None,
             charts: vec![],
             seams: Seams::default(),

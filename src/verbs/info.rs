@@ -4,9 +4,9 @@ use super::{Exit, say, say_json, shown};
 use crate::inputs;
 use crate::job::Job;
 use crate::outcome::Reason;
-use crate::report::{self, Counts, Repairs, Surface};
+use crate::report::{self, Counts, Repairs, Surface, Warning};
 use crate::settings::Settings;
-use crate::stages::{Folder, decode, guard, read_input, repaired};
+use crate::stages::{Folder, check_sheets, decode, guard, read_input, repaired};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +16,7 @@ struct Answer {
     input: String,
     surface: Option<Surface>,
     repairs: Option<Repairs>,
+    warnings: Vec<Warning>,
     reason: Option<Reason>,
 }
 
@@ -48,10 +49,11 @@ fn answer(job: &Job, settings: &Settings) -> Answer {
         Ok(found) => Answer {
             surface: Some(report::surface(&found)),
             repairs: Some(report::repairs(&found.report)),
+            warnings: report::warnings(&found),
             input,
-            reason: None,
+            reason: check_sheets(&found).err(),
         },
-        Err(reason) => Answer { input, surface: None, repairs: None, reason: Some(reason) },
+        Err(reason) => Answer { input, surface: None, repairs: None, warnings: vec![], reason: Some(reason) },
     }
 }
 
@@ -68,6 +70,7 @@ fn text(answer: &Answer, input: &Path) -> String {
         lines.push(format!("  area {:.6e}, box {min:?} to {max:?}", surface.repaired.area));
     }
     lines.extend(answer.repairs.iter().flat_map(repairs));
+    lines.extend(answer.warnings.iter().map(|w| format!("  warning  {}", w.message)));
     lines.join("\n")
 }
 
@@ -91,6 +94,8 @@ fn repairs(r: &Repairs) -> Vec<String> {
     let done = [
         (r.welded, "points welded"),
         (r.unreferenced_points, "points without triangles"),
+        (r.t_junctions_closed, "T-junctions closed"),
+        (r.t_junctions_left, "T-junctions left open"),
         (r.cracks_closed, "cracks closed"),
         (r.duplicate_triangles, "duplicate triangles removed"),
         (r.degenerate_triangles, "degenerate triangles removed"),

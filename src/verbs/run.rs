@@ -40,6 +40,7 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     let rows: Vec<Row> = jobs.iter().map(AsRef::as_ref).zip(&ends).collect();
     if !settings.quiet {
         super::say(&table(&rows).to_string());
+        rows.iter().for_each(|(job, end)| tell_doubts(job, end));
     }
     rows.iter().for_each(|(job, end)| tell_trouble(job, end));
     let is_good = |end: &End| matches!(end, End::Done(done) if done.report.status == Status::Certified);
@@ -151,5 +152,13 @@ fn tell_trouble(job: &Job, end: &End) {
             complain(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
         }
         End::Done(_) | End::Later(..) | End::Unwanted => {}
+    }
+}
+
+/// Says on standard error what is doubtful about the surface of an input.
+fn tell_doubts(job: &Job, end: &End) {
+    if let End::Done(done) | End::Later(done, _) | End::Unchained(done, _) = end {
+        let warnings = done.report.warnings.iter();
+        warnings.for_each(|w| complain(&format!("{}: warning: {}", shown(&job.path), w.message)));
     }
 }

@@ -5,12 +5,13 @@
 //! normals of the triangles around, weighted by area, on either side: sides that meet around the ends of the edge
 //! within a few triangles are the same side. Chains that are short all told are dropped, and patches that are small
 //! all round, or narrow bevels, are given to the neighbour with which they share most. What separates nothing then is
-//! no feature.
+//! no feature. Where coordinates lie in coarse steps ([`crate::mesh::SurfaceMesh::coarse_steps`]) the angles are those that
+//! rounding leaves sure: the stairs that it makes of a slope are no features.
 
 use super::Settings;
 use super::dual::Dual;
 use crate::host::{Cancelled, Host};
-use crate::id::HalfEdgeId;
+use crate::id::{FaceId, HalfEdgeId};
 use crate::mesh::SurfaceMesh;
 use crate::space::{Vec3, dot, norm};
 use crate::union_find::UnionFind;
@@ -63,11 +64,18 @@ fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     let candidates: Vec<_> = pairs.filter(bent).collect();
     let mut candidate = vec![false; dual.mesh.edges().len()];
     candidates.iter().for_each(|(h, _)| candidate[dual.mesh.edges().edge(*h).index()] = true);
-    let sides = |(h, t): &(HalfEdgeId, HalfEdgeId)| {
-        [side(dual, &normals, &candidate, *h), side(dual, &normals, &candidate, *t)]
+    let error = position_error(dual);
+    let sharpness = |(h, t): &(HalfEdgeId, HalfEdgeId)| {
+        let sides = [h, t].map(|e| side(dual, &candidate, *e));
+        let [m, n] = [0, 1].map(|k| sum_of(&normals, &sides[k]));
+        let cos = dot(m, n) / (norm(m) * norm(n));
+        if error == 0.0 {
+            return 1.0 - cos;
+        }
+        let doubt = doubt(dual, &sides[0], m, error) + doubt(dual, &sides[1], n, error);
+        1.0 - (cos.clamp(-1.0, 1.0).acos() - doubt).max(0.0).cos()
     };
-    let sharpness = |[m, n]: [Vec3; 2]| 1.0 - dot(m, n) / (norm(m) * norm(n));
-    let measured = candidates.iter().map(|c| (c.0, sharpness(sides(c)).min(1.0)));
+    let measured = candidates.iter().map(|c| (c.0, sharpness(c).min(1.0)));
     let kept = long_enough(dual, measured.filter(|m| m.1 > 1.0 - blunt).collect(), 1.0 - sharp);
     for (h, sharpness) in &kept {
         dual.sharpness[dual.mesh.edges().edge(*h).index()] = *sharpness;
@@ -149,9 +157,22 @@ fn is_bent(m: Vec3, n: Vec3, cos: f64) -> bool {
     dot(m, n) < cos * norm(m) * norm(n)
 }
 
-/// The sum of the area vectors on the side of `h`: its triangle and the next few that can be reached without crossing
-/// a candidate.
-fn side(dual: &Dual, normals: &[Vec3], candidate: &[bool], h: HalfEdgeId) -> Vec3 {
+/// How far off a vertex may be, where coordinates lie in coarse steps: half a step along every axis. In the unit of `dual`.
+fn position_error(dual: &Dual) -> f64 {
+    dual.mesh.coarse_steps().map_or(0.0, |steps| 0.5 * norm(steps.step) * dual.mesh.metric().scale)
+}
+
+/// By how much, in radians, the direction of the area vector of some triangles may be off where their vertices are. The
+/// area vector is half the sum of p x dp around their outline: it changes by at most half the error times the outline.
+fn doubt(dual: &Dual, faces: &[FaceId], area_vector: Vec3, error: f64) -> f64 {
+    let sides = faces.iter().flat_map(|f| [0, 1, 2].map(|k| HalfEdgeId::side_of(*f, k)));
+    let is_outer = |h: &HalfEdgeId| dual.across(*h).is_none_or(|t| !faces.contains(&t.face()));
+    let outline: f64 = sides.filter(is_outer).map(|h| dual.length(h)).sum();
+    (0.5 * error * outline / norm(area_vector)).min(1.0).asin()
+}
+
+/// The triangles on the side of `h`: its own and the next few that can be reached without crossing a candidate.
+fn side(dual: &Dual, candidate: &[bool], h: HalfEdgeId) -> Vec<FaceId> {
     let mut faces = vec![h.face()];
     let mut next = 0;
     while next < faces.len() && faces.len() < SIDE {
@@ -164,6 +185,11 @@ fn side(dual: &Dual, normals: &[Vec3], candidate: &[bool], h: HalfEdgeId) -> Vec
             }
         }
     }
+    faces
+}
+
+/// The sum of the area vectors of some triangles.
+fn sum_of(normals: &[Vec3], faces: &[FaceId]) -> Vec3 {
     faces.iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + normals[f.index()][k]))
 }
 

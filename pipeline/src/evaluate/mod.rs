@@ -10,9 +10,11 @@
 
 mod bvh;
 mod closest;
+mod plane;
 
 pub use bvh::Bvh;
 pub use closest::{OnTriangle, on_segment, on_triangle};
+pub use plane::Plane;
 
 use crate::space::{BoundingBox, Vec3};
 

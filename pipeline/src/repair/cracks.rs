@@ -14,7 +14,7 @@ use crate::space::{Vec3, distance, dot, midpoint, norm, sub};
 use crate::union_find::UnionFind;
 
 /// Triangles on the same side of an edge within this angle (10 degrees) face each other: the cosine.
-const FACING: f64 = 0.985;
+pub(super) const FACING: f64 = 0.985;
 
 /// Tolerances below this share of the largest coordinate are rounding: nothing is joined.
 const ROUNDING: f64 = 1e-15;

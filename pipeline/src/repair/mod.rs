@@ -2,7 +2,8 @@
 //!
 //! 1. Vertices with bit-equal coordinates are merged (the sign of zero does not count).
 //! 2. Triangles with two equal vertices, and copies of a triangle, are dropped. Slivers stay.
-//! 3. Cracks are closed: open edges that run side by side within a tolerance (see [`Settings::weld`]).
+//! 3. T-junctions are closed: triangles are split where vertices of another side lie on their open edges. Then cracks are:
+//!    open edges that run side by side within a tolerance (see [`Settings::weld`]).
 //! 4. Every orientable component is oriented like the majority of its triangles.
 //! 5. The surface is split along non-manifold edges, and where sheets only touch in a vertex: every sheet gets
 //!    vertices of its own.
@@ -10,20 +11,25 @@
 //!
 //! Everything that was found and done is counted, with the first few ids. The census of the result still counts
 //! the non-manifold edges that were split, and the vertices at which a sheet touches others away from its
-//! boundary: both have to become seams. What cannot be a surface at all (no triangle is left) is refused.
+//! boundary: both have to become seams. What cannot be a surface at all (no triangle is left) is refused, and what nobody
+//! wants charts of ([`Repaired::check_sheets`]).
 
 mod cracks;
+mod near;
+mod t_junctions;
 mod weld;
 
 use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::{Census, EdgeTable, Metric, SurfaceMesh, TriangleSoup, Umbrellas};
 use crate::space::{BoundingBox, Vec3, unit_scale};
+use t_junctions::Boundary;
 
 /// What repair may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Open edges closer than this, relative to the diagonal of the bounding box, are joined. In `[0, 0.01]`;
-    /// 0 joins none. Default 1e-6.
+    /// Open edges closer than this, relative to the diagonal of the bounding box, are joined, and split at vertices of
+    /// others that are no farther from them. In `[0, 0.01]`; 0 joins none, and splits at vertices that lie on edges within
+    /// the rounding of doubles. Default 1e-6.
     pub weld: f64,
 }
 
@@ -66,6 +72,12 @@ pub struct Report {
     pub welded: usize,
     /// Points that no triangle uses.
     pub unreferenced_points: usize,
+    /// Vertices (after welding) that lay on open edges of other triangles, which were split there.
+    pub t_junctions_closed: Found,
+    /// Vertices (after welding) on the boundary that lie on an open edge still.
+    pub t_junctions_left: Found,
+    /// Triangles of the surface beyond one for each of the input: parts of those that were split.
+    pub triangles_added: usize,
     /// Pairs of open edges joined.
     pub cracks_closed: usize,
     /// Copies of a triangle, removed.
@@ -104,6 +116,50 @@ pub enum Error {
         /// How many triangles there were.
         triangles: usize,
     },
+    /// Non-manifold edges cut the surface into more sheets than anybody wants charts.
+    #[error(
+        "{nonmanifold_edges} edges of three or more triangles cut {triangles} triangles into {sheets} sheets, as the faces \
+         of volume elements (tetrahedra, hexahedra) do; export the boundary of the volume only (at most {MAX_SHEETS} sheets, \
+         or {MAX_TINY_SHEETS} of fewer than {TINY_SHEET} triangles on average)"
+    )]
+    VolumeElements {
+        /// How many sheets there are beyond the parts of the input.
+        sheets: usize,
+        /// How many triangles there are.
+        triangles: usize,
+        /// Edges of three or more triangles.
+        nonmanifold_edges: usize,
+        /// The first vertices (after welding) at which sheets meet.
+        vertices: Vec<u32>,
+    },
+}
+
+/// Sheets that non-manifold edges may cut a surface into. Each is a chart at least: the 6480 of the faces of all tetrahedra
+/// in a grid of 8 x 8 x 8 cubes take 8 seconds, and the cost grows with the square of their number.
+const MAX_SHEETS: usize = 10_000;
+
+/// The same, for sheets of fewer than [`TINY_SHEET`] triangles on average: faces of volume elements have one or two, and
+/// an atlas of them is of no use. A network of faults or a foam has more.
+const MAX_TINY_SHEETS: usize = 1_000;
+
+/// See [`MAX_TINY_SHEETS`].
+const TINY_SHEET: usize = 4;
+
+impl Repaired {
+    /// Checks that what was repaired is worth an atlas.
+    ///
+    /// # Errors
+    /// [`Error::VolumeElements`].
+    pub fn check_sheets(&self) -> Result<(), Error> {
+        let census = self.mesh.census();
+        let (sheets, triangles) = (census.components.saturating_sub(self.raw.components), census.triangles);
+        let is_tiny = triangles < TINY_SHEET * sheets;
+        if sheets <= if is_tiny { MAX_TINY_SHEETS } else { MAX_SHEETS } {
+            return Ok(());
+        }
+        let vertices = self.report.split_vertices.first.clone();
+        Err(Error::VolumeElements { sheets, triangles, nonmanifold_edges: census.nonmanifold_edges, vertices })
+    }
 }
 
 /// Triangles on their way through repair: each with its position in the input.
@@ -111,6 +167,12 @@ struct Draft {
     points: Vec<Vec3>,
     triangles: Vec<[VertexId; 3]>,
     source: Vec<u32>,
+}
+
+/// The points of a draft in a unit in which distances neither overflow nor underflow, and the tolerance in that unit.
+struct Measure {
+    points: Vec<Vec3>,
+    tolerance: f64,
 }
 
 /// Repairs `soup`. The result depends on the order of the input only through its numbering.
@@ -130,13 +192,22 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     report.unreferenced_points = draft.points.len() - used;
     report.duplicate_triangles = draft.drop_duplicates();
     edges = renewed(edges, report.duplicate_triangles.count > 0, &draft.triangles);
-    draft.close_cracks(&edges, settings.weld, &mut report);
-    edges = renewed(edges, report.cracks_closed > 0, &draft.triangles);
-    let as_counted = report.duplicate_triangles.count == 0 && report.cracks_closed == 0;
+    let measure = draft.measure(settings.weld);
+    report.t_junctions_closed = draft.close_t_junctions(&edges, &measure);
+    let split = report.t_junctions_closed.count > 0;
+    edges = renewed(edges, split, &draft.triangles);
+    let copies = report.duplicate_triangles.count;
+    draft.close_cracks(&edges, &measure, &mut report);
+    let changed = report.cracks_closed > 0 || report.duplicate_triangles.count > copies;
+    edges = renewed(edges, changed, &draft.triangles);
+    report.t_junctions_left = draft.t_junctions_left(&edges, &measure);
+    drop(measure);
+    let as_counted = report.duplicate_triangles.count == 0 && report.cracks_closed == 0 && !split;
     if !as_counted || raw.inconsistent_edges > 0 {
         report.flipped_triangles = draft.orient(&edges);
         edges = renewed(edges, report.flipped_triangles.count > 0, &draft.triangles);
     }
+    report.triangles_added = if split { draft.count_added() } else { 0 };
     let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0);
     let mesh = draft.into_mesh(edges, known, &mut report);
     // As read: vertices of degenerate triangles count, though these do not.
@@ -154,6 +225,14 @@ impl Draft {
         let mut used = vec![false; self.points.len()];
         self.triangles.iter().flatten().for_each(|v| used[v.index()] = true);
         used.iter().filter(|u| **u).count()
+    }
+
+    /// The number of triangles beyond one for each of the input.
+    fn count_added(&self) -> usize {
+        let mut sources = self.source.clone();
+        sources.sort_unstable();
+        sources.dedup();
+        self.triangles.len() - sources.len()
     }
 
     /// Removes triangles with two equal vertices.
@@ -184,18 +263,52 @@ impl Draft {
         dropped
     }
 
-    /// Joins open edges within `weld` of each other, then drops what became a copy.
-    fn close_cracks(&mut self, edges: &EdgeTable, weld: f64, report: &mut Report) {
-        let Some(diagonal) = BoundingBox::of(self.used_points()).map(|b| b.diagonal()) else { return };
-        // Powers of two change no digit: distances are measured where they neither overflow nor underflow.
+    /// Makes distances comparable with `weld` of the diagonal.
+    fn measure(&self, weld: f64) -> Measure {
+        let diagonal = BoundingBox::of(self.used_points()).map_or(0.0, |b| b.diagonal());
+        // Powers of two change no digit.
         let scale = unit_scale(diagonal);
-        let scaled: Vec<Vec3> = self.points.iter().map(|p| p.map(|c| c * scale)).collect();
-        let closed = cracks::find(&scaled, &self.triangles, edges, weld * diagonal * scale);
+        let points = self.points.iter().map(|p| p.map(|c| c * scale)).collect();
+        Measure { points, tolerance: weld * diagonal * scale }
+    }
+
+    /// Splits triangles where vertices of others lie on their open edges; returns these vertices.
+    fn close_t_junctions(&mut self, edges: &EdgeTable, measure: &Measure) -> Found {
+        let splits = Boundary::new(&measure.points, &self.triangles, edges, measure.tolerance).splits();
+        let mut closed: Vec<VertexId> = splits.iter().flat_map(|s| s.1.iter().copied()).collect();
+        closed.sort_unstable();
+        closed.dedup();
+        for of_face in splits.chunk_by(|g, h| g.0.face() == h.0.face()) {
+            let mut on_sides = [const { Vec::new() }; 3];
+            of_face.iter().for_each(|(h, vertices)| on_sides[h.side()].clone_from(vertices));
+            self.split(of_face[0].0.face().index(), &on_sides);
+        }
+        Found::of(closed.into_iter().map(|v| v.0))
+    }
+
+    /// Puts the parts of a triangle at its place and at the end.
+    fn split(&mut self, face: usize, on_sides: &[Vec<VertexId>; 3]) {
+        let parts = t_junctions::parts(self.triangles[face], on_sides);
+        self.triangles[face] = parts[0];
+        self.source.extend(vec![self.source[face]; parts.len() - 1]);
+        self.triangles.extend_from_slice(&parts[1..]);
+    }
+
+    /// The boundary vertices that lie on a boundary edge.
+    fn t_junctions_left(&self, edges: &EdgeTable, measure: &Measure) -> Found {
+        let left = Boundary::new(&measure.points, &self.triangles, edges, measure.tolerance).vertices_on_edges();
+        Found::of(left.into_iter().map(|v| v.0))
+    }
+
+    /// Joins open edges within the tolerance of each other, then drops what became a copy.
+    fn close_cracks(&mut self, edges: &EdgeTable, measure: &Measure, report: &mut Report) {
+        let closed = cracks::find(&measure.points, &self.triangles, edges, measure.tolerance);
         report.cracks_closed = closed.pairs;
-        if closed.pairs == 0 {
+        if closed.pairs > 0 {
+            self.triangles.iter_mut().for_each(|t| *t = t.map(|v| closed.target[v.index()]));
+        } else if report.t_junctions_closed.count == 0 {
             return;
         }
-        self.triangles.iter_mut().for_each(|t| *t = t.map(|v| closed.target[v.index()]));
         let copies = self.drop_duplicates();
         report.duplicate_triangles.count += copies.count;
         report.duplicate_triangles.first.extend(copies.first);

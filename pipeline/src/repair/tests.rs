@@ -204,3 +204,158 @@ fn the_area_of_huge_and_tiny_surfaces_is_finite() {
         assert!((got.mesh.area() / area - 1.0).abs() < 1e-12);
     }
 }
+
+/// A soup of polygons that are cut into fans about their first corner.
+fn fans(polygons: &[Vec<Vec3>]) -> TriangleSoup {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for polygon in polygons {
+        let base = points.len() as u32;
+        points.extend(polygon);
+        triangles.extend((1..polygon.len() as u32 - 1).map(|i| [base, base + i, base + i + 1]));
+    }
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+/// A unit square and beside it, beyond the edge x = 1, triangles with a vertex at each of the `heights` on that edge; each
+/// vertex moved by `noise`.
+fn square_and_fine_side(heights: &[f64], noise: f64) -> TriangleSoup {
+    let mut side = vec![[2.0, 0.5, 0.0]];
+    let wobble = |i: usize| noise * (((i * 7) % 5) as f64 / 2.0 - 1.0);
+    side.extend(heights.iter().rev().enumerate().map(|(i, y)| [1.0 + wobble(i), *y, wobble(i + 3)]));
+    fans(&[vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]], side])
+}
+
+#[test]
+fn vertices_on_the_edge_of_another_side_split_it() {
+    let heights = [0.0, 0.1, 0.35, 0.5, 0.75, 1.0];
+    for (noise, weld) in [(0.0, 1e-6), (0.0, 0.0), (5e-7, 1e-6)] {
+        let soup = square_and_fine_side(&heights, noise);
+        let got = repair(&soup, &Settings { weld }).expect("a surface");
+        assert_eq!((got.report.t_junctions_closed.count, got.report.t_junctions_left.count), (4, 0), "{noise} {weld}");
+        let census = got.mesh.census();
+        assert!(census.is_one_chart() && census.boundary_loops == 1, "{census:?}");
+        assert_eq!((census.triangles, got.report.triangles_added), (2 + 5 + 4, 4));
+        assert!((got.mesh.area() - 1.5).abs() < 1e-5);
+        let parts = (0..census.triangles).filter(|f| got.mesh.source_triangle(*f) == 0).count();
+        assert_eq!(parts, 5, "the first triangle has the edge x = 1");
+    }
+}
+
+#[test]
+fn vertices_beside_an_edge_farther_than_the_tolerance_leave_it() {
+    for (noise, weld) in [(1e-4, 1e-6), (5e-7, 0.0)] {
+        let got = repair(&square_and_fine_side(&[0.0, 0.3, 0.7, 1.0], noise), &Settings { weld }).expect("a surface");
+        assert_eq!((got.report.t_junctions_closed.count, got.mesh.census().components), (0, 2));
+    }
+}
+
+#[test]
+fn both_sides_may_have_vertices_on_the_edges_of_the_other() {
+    let left = vec![[0.0, 0.5, 0.0], [1.0, -0.2, 0.0], [1.0, 0.4, 0.0], [1.0, 0.8, 0.0]];
+    let right = vec![[2.0, 0.5, 0.0], [1.0, 1.1, 0.0], [1.0, 0.6, 0.0], [1.0, 0.1, 0.0]];
+    let got = repaired(&fans(&[left, right]));
+    assert_eq!(got.report.t_junctions_closed.count, 4);
+    assert!(got.mesh.census().is_one_chart(), "{:?}", got.mesh.census());
+}
+
+#[test]
+fn a_triangle_is_split_on_all_of_its_sides() {
+    let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let mut polygons = vec![corners.to_vec()];
+    for k in 0..3 {
+        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+        let at = |t: f64| [0, 1, 2].map(|i| a[i] + t * (b[i] - a[i]));
+        let tip = [1.5 * (a[0] + b[0]) - 0.5, 1.5 * (a[1] + b[1]) - 0.5, 0.0];
+        polygons.push(vec![tip, b, at(0.75), at(0.5), at(0.25), a]);
+    }
+    let got = repaired(&fans(&polygons));
+    assert_eq!((got.report.t_junctions_closed.count, got.report.t_junctions_left.count), (9, 0));
+    assert!(got.mesh.census().is_one_chart() && got.mesh.census().boundary_loops == 1);
+    assert_eq!(got.mesh.census().triangles, 12 + 10);
+}
+
+#[test]
+fn three_sides_cut_differently_meet_in_non_manifold_edges() {
+    let page = |x: f64, y: f64, heights: &[f64]| {
+        let mut page = vec![[x, y, 0.5]];
+        page.extend(heights.iter().map(|z| [0.0, 0.0, *z]));
+        page
+    };
+    let pages =
+        [page(1.0, 0.0, &[0.0, 1.0]), page(-1.0, 0.2, &[0.0, 0.25, 0.5, 1.0]), page(0.0, 1.0, &[0.0, 0.5, 0.75, 1.0])];
+    let got = repaired(&fans(&pages));
+    assert_eq!((got.mesh.census().nonmanifold_edges, got.report.t_junctions_left.count), (4, 0), "{:?}", got.report);
+    assert_eq!(got.report.t_junctions_closed.count, 3);
+}
+
+#[test]
+fn walls_of_a_thin_gap_are_not_joined_at_t_junctions_but_told() {
+    for gap in [0.0, 1e-7] {
+        let upper = vec![[0.0, 0.0, gap], [1.0, 0.0, gap], [0.0, 1.0, gap]];
+        let lower =
+            vec![[0.1, 0.9, 0.0], [0.0, 0.9, 0.0], [0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.6, 0.0, 0.0], [1.0, 0.0, 0.0]];
+        let got = repaired(&fans(&[upper, lower]));
+        assert_eq!((got.report.t_junctions_closed.count, got.mesh.census().components), (0, 2), "gap {gap}");
+        assert!(got.report.t_junctions_left.count >= 2, "{:?}", got.report);
+    }
+}
+
+#[test]
+fn a_corner_that_touches_an_edge_does_not_split_it() {
+    let touching = vec![[1.0, 0.5, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0]];
+    let got = repaired(&fans(&[vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]], touching]));
+    assert_eq!((got.report.t_junctions_closed.count, got.report.t_junctions_left.count), (0, 1));
+}
+
+#[test]
+fn many_vertices_on_one_edge_and_many_long_edges_over_a_rim_cost_little() {
+    let n = 40_000;
+    let heights: Vec<f64> = (0..=n).map(|i| f64::from(i) / f64::from(n)).collect();
+    let got = repaired(&square_and_fine_side(&heights, 0.0));
+    assert_eq!(got.report.t_junctions_closed.count, n as usize - 1);
+    assert!(got.mesh.census().is_one_chart());
+    // Many long edges along a fine rim and each other: nobody can tell which belong together.
+    let mut polygons = vec![vec![[2.0, 0.5, 0.0]]];
+    polygons[0].extend(heights.iter().map(|y| [1.0, *y, 0.0]));
+    let beyond = |i: i32| 1e-4 * f64::from(i);
+    polygons.extend((1..n).map(beyond).map(|d| vec![[0.0, 0.0, d], [1.0, -d, 0.0], [1.0, 1.0 + 3.0 * d, 0.0]]));
+    assert!(repaired(&fans(&polygons)).mesh.census().triangles > 2 * n as usize - 2);
+}
+
+#[test]
+fn a_fine_rim_between_two_walls_does_not_join_them() {
+    let wall = |z: f64| vec![[0.0, 0.5, z], [1.0, 0.0, z], [1.0, 1.0, z]];
+    let rim = vec![[2.0, 0.5, 0.0], [1.0, 1.0, 0.0], [1.0, 0.6, 0.0], [1.0, 0.3, 0.0], [1.0, 0.0, 0.0]];
+    let got = repaired(&fans(&[wall(2e-7), wall(-2e-7), rim.clone()]));
+    assert_eq!((got.report.t_junctions_closed.count, got.mesh.census().nonmanifold_edges), (0, 0));
+    assert_eq!(got.report.t_junctions_left.count, 2);
+    assert!(repaired(&fans(&[wall(2e-7), rim])).mesh.census().is_one_chart());
+}
+
+/// The faces of all tetrahedra in a grid of n cubes each way, six in each (Kuhn's).
+fn faces_of_tetrahedra(n: u32) -> TriangleSoup {
+    let side = n + 1;
+    let point = |i: u32| [i % side, i / side % side, i / side / side].map(f64::from);
+    let steps = [1, side, side * side];
+    let mut faces = std::collections::BTreeSet::new();
+    for cube in (0..n * n * n).map(|i| i % n + side * (i / n % n) + side * side * (i / n / n)) {
+        for [x, y, z] in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let [a, b, c, d] = [0, steps[x], steps[x] + steps[y], steps[x] + steps[y] + steps[z]].map(|s| cube + s);
+            faces.extend([[a, b, c], [a, b, d], [a, c, d], [b, c, d]]);
+        }
+    }
+    TriangleSoup::new((0..side * side * side).map(point).collect(), faces.into_iter().collect()).expect("sound")
+}
+
+#[test]
+fn faces_of_volume_elements_are_refused_and_a_few_sheets_are_not() {
+    let refused = repaired(&faces_of_tetrahedra(16)).check_sheets();
+    let Err(Error::VolumeElements { sheets, triangles, nonmanifold_edges, vertices }) = refused else {
+        panic!("{refused:?}")
+    };
+    assert_eq!((triangles, nonmanifold_edges, vertices.len()), (50_688, 30_928, 8));
+    assert!(sheets > 50_000);
+    for few in [faces_of_tetrahedra(3), shapes::book(40, 20), shapes::sphere(8)] {
+        assert_eq!(repaired(&few).check_sheets(), Ok(()));
+    }
+}

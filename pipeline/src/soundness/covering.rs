@@ -11,13 +11,11 @@ use super::curves::{Boundaries, OnCurve};
 use super::loops::{self, Wrong};
 use super::reference::{HandedOverAtlas, HandedOverChart, Mesh};
 use super::{Defect, SurfaceDistance};
+use crate::evaluate::Plane;
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, VertexId};
-use crate::space::{Vec3, cross, dot, norm, sub, unit_scale};
+use crate::space::{Vec3, unit_scale};
 use std::collections::BTreeMap;
-
-/// A chart is flat where no node is further from its plane than this, relative to its extent.
-const FLAT: f64 = 1e-9;
 
 /// Looks at one chart with the given triangles of the mesh. `distance` learns how far its nodes are from it.
 pub fn check(
@@ -30,7 +28,7 @@ pub fn check(
 ) -> Vec<Defect> {
     let chart = &atlas.charts[id.index()];
     let places = &boundaries.places[id.index()];
-    let plane = Plane::of(chart);
+    let plane = Plane::of(chart.map.points(), chart.map.triangles());
     let rim = if plane.is_some() { Rim::default() } else { Rim::of(chart) };
     let mut uv: BTreeMap<VertexId, [f64; 2]> = BTreeMap::new();
     for v in triangles.iter().flat_map(|t| mesh.triangulation.triangles[*t as usize]) {
@@ -110,54 +108,6 @@ fn chained(open: &[[VertexId; 2]]) -> Result<Vec<Vec<VertexId>>, VertexId> {
         }
     }
     Ok(loops)
-}
-
-/// The plane of a flat chart.
-struct Plane {
-    origin: Vec3,
-    axes: [Vec3; 2],
-}
-
-impl Plane {
-    /// The plane of a chart, if it is flat and all its triangles turn the same way there.
-    fn of(chart: &HandedOverChart) -> Option<Self> {
-        let points = chart.map.points();
-        let corners = |t: &[u32; 3]| t.map(|n| points[n as usize]);
-        let origin = *points.first()?;
-        let mut normal = [0.0; 3];
-        for t in chart.map.triangles() {
-            let [a, b, c] = corners(t);
-            let n = cross(sub(b, a), sub(c, a));
-            (0..3).for_each(|k| normal[k] += n[k]);
-        }
-        let length = norm(normal);
-        if length.is_nan() || length <= 0.0 {
-            return None;
-        }
-        let normal = normal.map(|c| c / length);
-        let extent = points.iter().map(|p| norm(sub(*p, origin))).fold(0.0_f64, f64::max);
-        let is_off = |p: &Vec3| dot(sub(*p, origin), normal).abs() > FLAT * extent;
-        let plane = Self { origin, axes: axes(normal) };
-        let turns = |t: &[u32; 3]| {
-            let [a, b, c] = corners(t).map(|p| GridPoint::mid(plane.place(p).map(|x| x * unit_scale(extent))));
-            orientation(a, b, c) > 0
-        };
-        (!points.iter().any(is_off) && chart.map.triangles().iter().all(turns)).then_some(plane)
-    }
-
-    fn place(&self, x: Vec3) -> [f64; 2] {
-        self.axes.map(|axis| dot(sub(x, self.origin), axis))
-    }
-}
-
-/// Two directions at right angles to a unit normal and each other, which turn left around it.
-fn axes(normal: Vec3) -> [Vec3; 2] {
-    let least = (1..3).fold(0, |best, k| if normal[k].abs() < normal[best].abs() { k } else { best });
-    let mut direction = [0.0; 3];
-    direction[least] = 1.0;
-    let first = cross(direction, normal);
-    let first = first.map(|c| c / norm(first));
-    [first, cross(normal, first)]
 }
 
 /// The boundary of a chart in the plane, by its places in space.

@@ -42,7 +42,7 @@ impl Narrow {
     const MOST_SAMPLES: f64 = 500.0;
 
     /// How much larger elements may become over a distance.
-    const GRADATION: f64 = 0.3;
+    const GRADATION: f64 = 0.5;
 }
 
 /// The algorithms that the script asks for.
@@ -159,7 +159,7 @@ Field[{threshold}] = Threshold;
 Field[{threshold}].InField = {distance};
 Field[{threshold}].SizeMin = (size < {size} ? size : {size}) * {factor};
 Field[{threshold}].SizeMax = size * {factor};
-Field[{threshold}].DistMin = 2 * {size} * {factor};
+Field[{threshold}].DistMin = {size} * {factor};
 Field[{threshold}].DistMax = (size < {size} ? {size} : size) / {gradation} * {factor};
 ",
             curves = tags(&place.curves),
