@@ -5,9 +5,9 @@ use crate::report::HandOff;
 use pipeline::CertifiedChart;
 use pipeline::atlas::Chart;
 use pipeline::evaluate::Plane;
-use pipeline::id::{ChartId, CurveId, FaceId};
+use pipeline::id::{ChartId, FaceId};
 use pipeline::mesh::SurfaceMesh;
-use pipeline::seams::SeamNetwork;
+use pipeline::seams::{Curve, Passage, SeamNetwork};
 use pipeline::space::unit_scale;
 use pipeline::subdivide::{self, LinearAtlas, subdivide};
 
@@ -24,8 +24,12 @@ const STRETCHED: f64 = 10.0;
 /// A place is narrow if it is narrower than this share of an edge: elements are as small there.
 const NARROW: f64 = 0.75;
 
-/// Closed curves get at least so many edges.
+/// Every loop of a chart gets at least so many edges.
 const EDGES_PER_LOOP: f64 = 6.0;
+
+/// And every curve along a narrow place at most about so many: a chart as long as the part and a thousandth as wide would
+/// have as many elements as all others together.
+const MOST_EDGES: f64 = 200.0;
 
 /// MeshAdapt of Gmsh looks for closest points among all triangles within this distance, in whatever unit.
 const SEARCHED: f64 = 0.1;
@@ -74,21 +78,10 @@ pub fn gmsh(
 
 /// The curves along narrow places, by the size of elements there: half of `size`, a quarter, and so on.
 fn narrow(charts: &[Chart], network: &SeamNetwork, size: f64) -> Vec<gmsh::Narrow> {
-    let length = |c: CurveId| network.curves()[c.index()].length();
-    let width = |chart: &Chart| {
-        let area: f64 = (0..chart.triangles().len()).map(|f| chart.area(f)).sum();
-        let perimeter: f64 = network.loops(chart.id()).iter().flatten().map(|p| length(p.curve)).sum();
-        // That of a strip of any length; the radius of a disk.
-        2.0 * area / perimeter
-    };
-    let widths: Vec<f64> = charts.iter().map(width).collect();
-    let mut found: Vec<gmsh::Narrow> = Vec::new();
-    for halvings in 1..=gmsh::Narrow::HALVINGS {
-        found.push(gmsh::Narrow { size: size * 0.5_f64.powi(halvings as i32), curves: vec![], longest: 0.0 });
-    }
-    for curve in network.curves() {
-        let own = if curve.is_closed() { curve.length() / EDGES_PER_LOOP } else { curve.length() };
-        let wanted = curve.sides().iter().map(|s| widths[s.chart.index()]).fold(own, f64::min);
+    let halved = |n: u32| gmsh::Narrow { size: size * 0.5_f64.powi(n as i32), curves: vec![], longest: 0.0 };
+    let mut found: Vec<gmsh::Narrow> = (1..=gmsh::Narrow::HALVINGS).map(halved).collect();
+    for (curve, wanted) in network.curves().iter().zip(wanted_sizes(charts, network)) {
+        let wanted = wanted.max(curve.length() / MOST_EDGES);
         if wanted < NARROW * size {
             let halvings = (size / wanted).log2().round().clamp(1.0, f64::from(gmsh::Narrow::HALVINGS));
             let at = &mut found[halvings as usize - 1];
@@ -98,6 +91,30 @@ fn narrow(charts: &[Chart], network: &SeamNetwork, size: f64) -> Vec<gmsh::Narro
     }
     found.retain(|n| !n.curves.is_empty());
     found
+}
+
+/// The largest size of elements along each curve that its charts can do with.
+///
+/// Loops need a few edges each: Gmsh leaves charts with two nodes on their boundary out, and two charts with the same three
+/// nodes become the same triangle. A chart needs elements as small as it is wide, and a curve one edge.
+fn wanted_sizes(charts: &[Chart], network: &SeamNetwork) -> Vec<f64> {
+    let mut wanted: Vec<f64> = network.curves().iter().map(Curve::length).collect();
+    for chart in charts {
+        let area: f64 = (0..chart.triangles().len()).map(|f| chart.area(f)).sum();
+        let length = |turn: &Vec<Passage>| turn.iter().map(|p| network.curves()[p.curve.index()].length()).sum::<f64>();
+        let loops = network.loops(chart.id());
+        let perimeter: f64 = loops.iter().map(length).sum();
+        // That of a strip of any length; the radius of a disk.
+        let width = 2.0 * area / perimeter;
+        for turn in loops {
+            let size = width.min(length(turn) / EDGES_PER_LOOP);
+            for passage in turn {
+                let known = &mut wanted[passage.curve.index()];
+                *known = known.min(size);
+            }
+        }
+    }
+    wanted
 }
 
 /// MeshAdapt where maps stretch, in a unit in which it searches little more than a tenth of an edge around a point.

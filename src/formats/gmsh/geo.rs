@@ -34,9 +34,8 @@ pub struct Narrow {
 }
 
 impl Narrow {
-    /// The sizes of narrow places: the size halved so often at most. Narrower ones get elements of the least of these: beyond
-    /// it a mesh would be many times as large for places that nobody sees.
-    pub const HALVINGS: u32 = 5;
+    /// The sizes of narrow places: the size halved so often at most.
+    pub const HALVINGS: u32 = 10;
 
     /// Points of a curve from which distances are measured, at most: curves are polylines of many more.
     const MOST_SAMPLES: f64 = 500.0;
@@ -213,7 +212,7 @@ mod tests {
         let algorithms = Algorithms { adapted: vec![], enlarged: 4.0 };
         let text = script(algorithms, vec![place(0.15, vec![0, 6]), place(0.075, vec![2])]);
         for line in [
-            "Mesh.MeshSizeMin = 1 / 32 * size * 4;",
+            "Mesh.MeshSizeMin = 1 / 1024 * size * 4;",
             "Field[1].CurvesList = {1, 7};",
             "Field[3].CurvesList = {3};",
             "Field[4].SizeMin = (size < 0.075 ? size : 0.075) * 4;",
