@@ -1,13 +1,16 @@
 //! File formats: which there are, and reading a soup of triangles from the bytes of a file.
 
 mod content;
+mod finish;
 mod gltf;
 pub mod gmsh;
+mod medit;
 mod msh;
 #[cfg(test)]
 #[path = "../../tests/fuzz/mutate/mod.rs"]
 mod mutate;
 mod obj;
+mod off;
 mod place;
 mod ply;
 mod polygon;
@@ -20,6 +23,7 @@ mod words;
 use crate::outcome::{Code, Reason};
 pub use content::{Beside, Content, Limits, Notes, Nothing, Source, TooMany};
 use pipeline::mesh::SoupError;
+use place::Place;
 use std::path::Path;
 pub use vtk::{vtm, vtp, vtu};
 
@@ -42,6 +46,10 @@ pub enum Format {
     Ply,
     /// MSH of Gmsh, ASCII or binary.
     Msh,
+    /// Object File Format of Geomview.
+    Off,
+    /// The text format of MEDIT (`.mesh`).
+    Medit,
 }
 
 impl Format {
@@ -53,7 +61,7 @@ impl Format {
             // Records of one size in binary files. Text takes five times as much.
             Self::Stl => 50,
             // Quads in text of six decimals: 30. Triangles: 37.
-            Self::Obj => 30,
+            Self::Obj | Self::Off => 30,
             // Binary quads: 14.5. Binary triangles: 19. Text: 37.
             Self::Ply => 14,
             // Indices of 16 bits: 12. Of 32 bits: 18.
@@ -64,6 +72,8 @@ impl Format {
             Self::Vtu | Self::Vtp => 9,
             // Binary quads of version 2: 28, of version 4: 36. Triangles: 38 and 48.
             Self::Msh => 28,
+            // Quads in text of six decimals, each line with a reference: 34.
+            Self::Medit => 34,
         }
     }
 }
@@ -82,10 +92,10 @@ pub enum Kind {
 }
 
 /// Extensions of meshes in formats that this version does not read.
-const OTHER_MESHES: [&str; 1] = ["off"];
+const OTHER_MESHES: [&str; 1] = ["meshb"];
 
 /// The extensions that planish reads, as people are told.
-pub const READ: &str = ".stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh";
+pub const READ: &str = ".stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh .off .mesh";
 
 /// Extensions of what lies beside meshes, or only names them.
 const NO_MESHES: [&str; 16] = [
@@ -121,6 +131,8 @@ pub fn kind(path: &Path) -> Kind {
         "vtp" => Kind::Mesh(Format::Vtp),
         "ply" => Kind::Mesh(Format::Ply),
         "msh" => Kind::Mesh(Format::Msh),
+        "off" => Kind::Mesh(Format::Off),
+        "mesh" => Kind::Mesh(Format::Medit),
         e if OTHER_MESHES.contains(&e) => Kind::OtherMesh(extension),
         e if NO_MESHES.contains(&e) => Kind::NoMesh,
         _ => Kind::Unknown(extension),
@@ -159,9 +171,32 @@ pub enum ReadError {
     /// Not an MSH file.
     #[error(transparent)]
     Msh(#[from] msh::MshError),
-    /// What was read makes no sense.
+    /// Not an OFF file.
     #[error(transparent)]
-    Soup(#[from] SoupError),
+    Off(#[from] off::OffError),
+    /// Not a file of MEDIT.
+    #[error(transparent)]
+    Medit(#[from] medit::MeditError),
+    /// There are elements, but none of a surface.
+    #[error("the file holds no surface, only {found}; {remedy}")]
+    NoSurface {
+        /// What there is.
+        found: String,
+        /// What to do.
+        remedy: &'static str,
+        /// What else there is to tell.
+        notes: Box<Notes>,
+    },
+    /// What was read makes no sense.
+    #[error("{}{error}", place.map(|p| format!("{p}: ")).unwrap_or_default())]
+    Soup {
+        /// Why.
+        error: SoupError,
+        /// The line or byte, where there is one.
+        place: Option<Place>,
+        /// What else there is to tell.
+        notes: Box<Notes>,
+    },
 }
 
 impl ReadError {
@@ -176,9 +211,44 @@ impl ReadError {
             Self::Vtk(e) => (e.code(), e.place()),
             Self::Ply(e) => (e.code(), e.place()),
             Self::Msh(e) => (e.code(), e.place()),
-            Self::Soup(e) => soup_reason(e),
+            Self::Off(e) => (e.code(), e.place()),
+            Self::Medit(e) => (e.code(), e.place()),
+            Self::NoSurface { .. } => (Code::NoTriangles, None),
+            Self::Soup { error, place, .. } => {
+                let (code, element) = soup_reason(error);
+                (code, place.map(|p| p.to_string()).or(element))
+            }
         };
         Reason::at(code, self, place)
+    }
+
+    /// What the file holds beside a surface, where it could be read to its end.
+    pub fn notes(&self) -> Option<&Notes> {
+        match self {
+            Self::NoSurface { notes, .. } | Self::Soup { notes, .. } => Some(notes),
+            _ => None,
+        }
+    }
+}
+
+/// A refusal, with what could be read all the same.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// Why.
+    pub reason: Reason,
+    /// What the file holds, where it could be read to its end.
+    pub notes: Option<Notes>,
+}
+
+impl From<Reason> for Refusal {
+    fn from(reason: Reason) -> Self {
+        Self { reason, notes: None }
+    }
+}
+
+impl From<Refusal> for Reason {
+    fn from(refusal: Refusal) -> Self {
+        refusal.reason
     }
 }
 
@@ -202,6 +272,8 @@ impl std::fmt::Display for Format {
             Self::Vtp => "VTP",
             Self::Ply => "PLY",
             Self::Msh => "MSH",
+            Self::Off => "OFF",
+            Self::Medit => "MEDIT",
         })
     }
 }
@@ -210,7 +282,7 @@ impl std::fmt::Display for Format {
 ///
 /// # Errors
 /// The refusal.
-pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Reason> {
+pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Refusal> {
     read(format, source).map_err(|error| {
         let mut reason = error.reason();
         // Those are in no format.
@@ -220,7 +292,7 @@ pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Reason> 
             let separator = if begins_with_place { "," } else { ":" };
             reason.message = format!("{format}{separator} {}", reason.message);
         }
-        reason
+        Refusal { reason, notes: error.notes().cloned() }
     })
 }
 
@@ -247,6 +319,8 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
         Format::Vtk | Format::Vtu | Format::Vtp => vtk::read(&unmarked),
         Format::Ply => ply::read(&unmarked),
         Format::Msh => msh::read(&unmarked),
+        Format::Off => off::read(&unmarked),
+        Format::Medit => medit::read(&unmarked),
     }
 }
 
@@ -268,7 +342,9 @@ mod tests {
         assert_eq!(kind(Path::new("scan.obj")), Kind::Mesh(Format::Obj));
         assert_eq!(kind(Path::new("scan.ply")), Kind::Mesh(Format::Ply));
         assert_eq!(kind(Path::new("Part.Msh")), Kind::Mesh(Format::Msh));
-        assert_eq!(kind(Path::new("scan.off")), Kind::OtherMesh("off".to_owned()));
+        assert_eq!(kind(Path::new("scan.OFF")), Kind::Mesh(Format::Off));
+        assert_eq!(kind(Path::new("part.mesh")), Kind::Mesh(Format::Medit));
+        assert_eq!(kind(Path::new("part.meshb")), Kind::OtherMesh("meshb".to_owned()));
         for (name, format) in [("a.vtk", Format::Vtk), ("a.vtu", Format::Vtu), ("a.VTP", Format::Vtp)] {
             assert_eq!(kind(Path::new(name)), Kind::Mesh(format));
         }
@@ -303,8 +379,8 @@ mod tests {
             (b"PK\x03\x04\x14\0", "zip"),
             (b"\n<!DOCTYPE html>\n<html>", "web page"),
             (b"(0 \"GAMBIT to Fluent File\")\n", "Fluent"),
-            (b"MeshVersionFormatted 2\n", "MEDIT"),
-            (b"OFF\n3 1 0\n", "OFF"),
+            (b"\x01\0\0\0\x02\0\0\0\x03\0\0\0", "MEDIT"),
+            (b"\0\0\0\x01\0\0\0\x04\0\0\0\x03", "MEDIT"),
             (b"ISO-10303-21;\n", "STEP"),
         ];
         for (bytes, what) in rows {
