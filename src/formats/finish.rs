@@ -58,7 +58,8 @@ const OF_VOLUMES: &str = "their surface must be saved: in ParaView apply the fil
                           again";
 
 /// What to do where there is less than a surface.
-const OF_LINES: &str = "points and lines make no surface: export the surface itself, as triangles, quadrilaterals or polygons";
+const OF_LINES: &str =
+    "points and lines make no surface: export the surface itself, as triangles, quadrilaterals or polygons";
 
 /// Elements of volumes, by a part of their names in VTK, Gmsh and MEDIT.
 const VOLUMES: [&str; 9] =

@@ -145,7 +145,8 @@ pub(super) fn foreign_number(word: &[u8]) -> Option<(&'static str, &'static str)
         let sign = text.rfind(['+', '-']).filter(|at| *at > 0 && text.as_bytes()[at - 1].is_ascii_digit())?;
         Some(format!("{}e{}", &text[..sign], &text[sign..]))
     };
-    let is_fortran = is_number(&text.replacen(['D', 'd', 'Q', 'q'], "e", 1)) || without_letter().is_some_and(|t| is_number(&t));
+    let is_fortran =
+        is_number(&text.replacen(['D', 'd', 'Q', 'q'], "e", 1)) || without_letter().is_some_and(|t| is_number(&t));
     is_fortran.then_some(("has a Fortran exponent", "export with exponents of E, as 1.0E+03"))
 }
 
@@ -200,7 +201,10 @@ mod tests {
             assert_eq!(told(word), None, "{word}");
         }
         assert!(float(b"-1.#IND").is_some_and(f64::is_nan) && float(b"nan(ind)").is_some_and(f64::is_nan));
-        assert_eq!(no_number(b"0,5"), "\"0,5\" is no number, it has a decimal comma: export with a point as decimal separator");
+        assert_eq!(
+            no_number(b"0,5"),
+            "\"0,5\" is no number, it has a decimal comma: export with a point as decimal separator"
+        );
         assert_eq!(no_number(b"x"), "\"x\" is no number");
     }
 }

@@ -1,8 +1,8 @@
-use pipeline::mesh::TriangleSoup;
 use super::super::{Beside, Format, Limits, Nothing, read_alone};
 use super::*;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use pipeline::mesh::TriangleSoup;
 use serde_json::{Value, json};
 use std::cell::RefCell;
 

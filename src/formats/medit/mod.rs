@@ -190,7 +190,8 @@ impl<'a> Values<'a> {
     /// A vertex, of so many, which are counted from 1.
     fn vertex(&mut self, vertices: usize) -> Result<u32, MeditError> {
         let word = self.word()?;
-        let number = integer(word).and_then(|n| u32::try_from(n).ok()).filter(|n| (1..=vertices).contains(&(*n as usize)));
+        let number =
+            integer(word).and_then(|n| u32::try_from(n).ok()).filter(|n| (1..=vertices).contains(&(*n as usize)));
         let problem = || format!("\"{}\" is no vertex: there are {vertices}, counted from 1", shown(word));
         Ok(number.ok_or_else(|| self.wrong(word, problem))? - 1)
     }

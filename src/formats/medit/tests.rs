@@ -69,10 +69,25 @@ fn broken_files_are_refused_with_code_and_place() {
         (good.replace("Dimension 3", ""), Code::Malformed, None, "Dimension before Vertices"),
         (good.replace("Vertices", "Points"), Code::Malformed, None, "no section Vertices"),
         (good.replace("Vertices\n4", "Vertices\n-4"), Code::Malformed, Some("line 6"), "\"-4\" is no number"),
-        (good.replace("Vertices\n4", "Vertices\n4000000000"), Code::CountMismatch, Some("line 6"), "4000000000 records"),
+        (
+            good.replace("Vertices\n4", "Vertices\n4000000000"),
+            Code::CountMismatch,
+            Some("line 6"),
+            "4000000000 records",
+        ),
         (good.replace("Vertices\n4", "Vertices\n9223372036854775807"), Code::CountMismatch, Some("line 6"), "cut off"),
-        (good.replace("Vertices\n4", "Vertices\n5"), Code::CountMismatch, Some("line 12"), "\"Triangles\" stands where"),
-        (good.replace("Vertices\n4", "Vertices\n3"), Code::CountMismatch, Some("line 10"), "\"0\" stands where a keyword"),
+        (
+            good.replace("Vertices\n4", "Vertices\n5"),
+            Code::CountMismatch,
+            Some("line 12"),
+            "\"Triangles\" stands where",
+        ),
+        (
+            good.replace("Vertices\n4", "Vertices\n3"),
+            Code::CountMismatch,
+            Some("line 10"),
+            "\"0\" stands where a keyword",
+        ),
         (good.replace("1 1 0.5 1", "1 1 x 1"), Code::CountMismatch, Some("line 9"), "\"x\" stands where"),
         (good.replace("1 1 0.5 1", "1 1 0,5 1"), Code::Malformed, Some("line 9"), "decimal comma"),
         (good.replace("1 1 0.5 1", "1 1 5.D-1 1"), Code::Malformed, Some("line 9"), "Fortran exponent"),
@@ -80,10 +95,10 @@ fn broken_files_are_refused_with_code_and_place() {
         (good.replace("1 3 4 7", "1 3 5 7"), Code::Malformed, Some("line 15"), "\"5\" is no vertex: there are 4"),
         (good.replace("1 3 4 7", "0 3 4 7"), Code::Malformed, Some("line 15"), "in section Triangles"),
         (good.replace("Triangles\n2", "Triangles\n3"), Code::CountMismatch, Some("line 13"), "cut off"),
-        (square("Triangles\n2\n1 2 3 7\nCorners\n1\n1\n"), Code::CountMismatch, Some("line 15"), "\"Corners\" stands"),
+        (square("Triangles\n2\n1 2 3 7\nCorners\n2\n1\n2\n"), Code::CountMismatch, Some("line 15"), "\"Corners\" stands"),
         (good.replace("Triangles\n2", "Triangles\n1"), Code::CountMismatch, Some("line 15"), "a keyword should"),
         (square(&format!("{TWO}Vertices\n0\n")), Code::Malformed, Some("line 17"), "another section Vertices"),
-        (format!("{SQUARE}Triangles\n2\n1 2 3 7\n1 3 4"), Code::CountMismatch, Some("line 15"), "ends in section"),
+        (format!("{SQUARE}Triangles\n2\n1 2 3 7\n1 3      4"), Code::CountMismatch, Some("line 15"), "ends in section"),
     ];
     for (text, code, place, word) in rows {
         let reason = content(&text).expect_err(&text).reason();
@@ -107,7 +122,8 @@ fn limits_are_kept() {
 
 #[test]
 fn mutated_files_do_no_harm() {
-    let sections = "Quadrilaterals\n1\n1 2 3 4 0\nTrianglesP2\n1\n1 2 3 4 4 4 0\nCorners\n1\n1\nTetrahedra\n1\n1 2 3 4 0\n";
+    let sections =
+        "Quadrilaterals\n1\n1 2 3 4 0\nTrianglesP2\n1\n1 2 3 4 4 4 0\nCorners\n1\n1\nTetrahedra\n1\n1 2 3 4 0\n";
     let seed = square(&format!("{TWO}{sections}"));
     let accepted = mutations(seed.as_bytes(), 20_000).filter(|b| read_alone(Format::Medit, b).is_ok()).count();
     assert!(accepted > 500, "{accepted}");

@@ -4,8 +4,8 @@ use super::MshError;
 use super::nodes::Nodes;
 use super::shapes::{Kind, Shape};
 use super::values::{Fault, Values};
-use crate::formats::place::Place;
 use crate::formats::finish;
+use crate::formats::place::Place;
 use crate::formats::{Content, Limits, Notes, ReadError, TooMany, polygon};
 use std::collections::BTreeMap;
 

@@ -413,7 +413,7 @@ fn broken_files_are_refused_with_code_and_place() {
         (two.replace("2 1 0 0", "-2 1 0 0"), Code::Malformed, Some("line 7"), "-2 is negative"),
         (two.replace("2 1 0 0", "2 1 nan 0"), Code::NotFinite, Some("line 7"), "NaN"),
         (two.replace("2 1 0 0", "2 1 0,5 0"), Code::Malformed, Some("line 7"), "decimal comma"),
-        (four.replace("4 0 0 0", "4 0 0 0.0D+00"), Code::Malformed, Some("line 9"), "Fortran exponent"),
+        (four.replace("4 1 0 0", "4 1.0D+00 0 0"), Code::Malformed, Some("line 9"), "Fortran exponent"),
         (two.replace("2 1 0 0", "2 1 x 0"), Code::Malformed, Some("line 7"), "\"x\" is no number"),
         (two.replace("8 9 1 3 4", "8 9 1 3 5"), Code::Malformed, Some("line 15"), "element 102 names node 5"),
         (two.replace("102 2 2", "102 34 2"), Code::Malformed, Some("line 15"), "34 is no type"),

@@ -93,7 +93,9 @@ fn no_number(word: &[u8]) -> Fault {
 fn end_of(rest: &[u8], section: &[u8], is_binary: bool) -> Option<(usize, usize)> {
     let name = [b"$End", section].concat();
     let blank = |at: usize| rest.get(at).is_none_or(u8::is_ascii_whitespace);
-    let stands = |at: &usize| rest[*at..].starts_with(&name) && (is_binary || *at == 0 || blank(at - 1)) && blank(at + name.len());
+    let stands = |at: &usize| {
+        rest[*at..].starts_with(&name) && (is_binary || *at == 0 || blank(at - 1)) && blank(at + name.len())
+    };
     let at = (0..rest.len()).filter(|at| rest[*at] == b'$').find(stands)?;
     Some((at, at + name.len()))
 }

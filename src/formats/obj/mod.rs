@@ -81,7 +81,11 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let statements = Statements::new(source.bytes);
     let geometry = check(&statements, source.limits)?;
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let loaded = tobj::load_obj_buf(&mut Plain::new(statements, !geometry.bad.0.is_empty()), &tobj::LoadOptions::default(), no_materials);
+    let loaded = tobj::load_obj_buf(
+        &mut Plain::new(statements, !geometry.bad.0.is_empty()),
+        &tobj::LoadOptions::default(),
+        no_materials,
+    );
     let (models, _) = loaded.map_err(|e| ObjError::Library { problem: e.to_string() })?;
     let mut notes = Notes::new("OBJ");
     names(source.bytes).for_each(|name| notes.name(&String::from_utf8_lossy(name)));
@@ -312,7 +316,10 @@ mod tests {
         let comma = error("v 0 0 0\nv 1 0,5 0\nv 0 1 0\nf 1 2 3\n");
         assert!(comma.to_string().contains("line 2: \"0,5\" is no number, it has a decimal comma"), "{comma}");
         let fortran = error("v 0 0 1.0D+00\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-        assert!(fortran.to_string().contains("line 1: \"1.0D+00\" is no number, it has a Fortran exponent"), "{fortran}");
+        assert!(
+            fortran.to_string().contains("line 1: \"1.0D+00\" is no number, it has a Fortran exponent"),
+            "{fortran}"
+        );
         assert!(matches!(error("v 0 0 0\nv 1 x 0\nv 0 1 0\nf 1 2 3\n"), ObjError::Syntax { line: 2, .. }));
         assert!(matches!(error(&format!("{SQUARE}f 1 2 z\n")), ObjError::Syntax { line: 6, .. }));
         assert!(matches!(error(&format!("{SQUARE}f 1 2\n")), ObjError::Syntax { line: 6, .. }));

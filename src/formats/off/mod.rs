@@ -17,7 +17,9 @@ use pipeline::space::Vec3;
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum OffError {
     /// It begins with something else.
-    #[error("the file begins with \"{begins}\", neither with \"OFF\" nor with numbers: it is no OFF file; export it again")]
+    #[error(
+        "the file begins with \"{begins}\", neither with \"OFF\" nor with numbers: it is no OFF file; export it again"
+    )]
     NotOff {
         /// What it begins with.
         begins: String,
@@ -270,7 +272,8 @@ impl File<'_> {
         let count = count.ok_or_else(|| Fault::Value(format!("\"{}\" is no number of corners", shown(word))))?;
         for _ in 0..count {
             let word = self.words.next().ok_or(Fault::End)?;
-            let corner = integer(word).and_then(|i| u32::try_from(i).ok()).filter(|i| (*i as usize) < self.points.len());
+            let corner =
+                integer(word).and_then(|i| u32::try_from(i).ok()).filter(|i| (*i as usize) < self.points.len());
             corners.push(corner.ok_or_else(|| {
                 let points = self.points.len();
                 Fault::Value(format!("\"{}\" is no vertex: there are {points}, counted from 0", shown(word)))

@@ -91,7 +91,8 @@ fn limits_are_kept() {
 
 #[test]
 fn mutated_files_do_no_harm() {
-    let seed = square("COFF", &["3 0 1 2", "5 0 1 2 3 1 0.5 0.5 0.5", "# a comment", "2 0 1"]).replace("4 4 5", "4 3 5");
+    let seed =
+        square("COFF", &["3 0 1 2", "5 0 1 2 3 1 0.5 0.5 0.5", "# a comment", "2 0 1"]).replace("4 4 5", "4 3 5");
     let accepted = mutations(seed.as_bytes(), 20_000).filter(|b| read_alone(Format::Off, b).is_ok()).count();
     assert!(accepted > 500, "{accepted}");
 }

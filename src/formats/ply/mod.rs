@@ -137,9 +137,9 @@ impl PlyError {
             | Self::HeaderEnds { line, .. }
             | Self::NoProperty { line, .. }
             | Self::Count { line, .. } => Some(Place::Line(*line).to_string()),
-            Self::Truncated { place, .. }
-            | Self::Value { place, .. }
-            | Self::Trailing { place, .. } => Some(place.to_string()),
+            Self::Truncated { place, .. } | Self::Value { place, .. } | Self::Trailing { place, .. } => {
+                Some(place.to_string())
+            }
         }
     }
 }

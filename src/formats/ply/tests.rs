@@ -184,7 +184,10 @@ fn broken_files_are_refused_with_code_and_place() {
         assert!(reason.message.contains(word), "{reason:?}");
     }
     let cloud = square(&[]);
-    assert!(matches!(content(cloud.as_bytes()), Err(ReadError::Soup { error: SoupError::NoTriangles { points: 4 }, .. })));
+    assert!(matches!(
+        content(cloud.as_bytes()),
+        Err(ReadError::Soup { error: SoupError::NoTriangles { points: 4 }, .. })
+    ));
 }
 
 /// No triangle uses point 3: whatever its coordinates are, the others stay what they are.

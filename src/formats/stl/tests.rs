@@ -101,7 +101,10 @@ fn a_missing_end_after_a_facet_is_told() {
     let two = format!("solid a\n{}endsolid a\nsolid b\n{}", facet("0"), facet("1"));
     for text in [&two[..], two.trim_end(), &two[two.find("solid b").expect("there")..]] {
         let (_, remarks) = remarks(text.as_bytes());
-        assert!(remarks.len() == 1 && remarks[0].contains("without \"endsolid\", after a complete facet"), "{remarks:?}");
+        assert!(
+            remarks.len() == 1 && remarks[0].contains("without \"endsolid\", after a complete facet"),
+            "{remarks:?}"
+        );
     }
     assert_eq!(remarks(format!("{two}endsolid").as_bytes()), (2, vec![]));
     for cut in ["solid\n", &two[..two.find("facet normal 0 0 1\nouter loop\nvertex 1").expect("there")]] {
