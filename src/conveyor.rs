@@ -254,7 +254,7 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
             None => {
                 let content = stages::decode(&travel.job.path, &bytes, settings, &folder);
                 Ok(content.map_err(|refusal| {
-                    report.content = refusal.notes;
+                    report.content = refusal.notes.map(|notes| *notes);
                     refusal.reason
                 })?)
             }

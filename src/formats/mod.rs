@@ -237,7 +237,7 @@ pub struct Refusal {
     /// Why.
     pub reason: Reason,
     /// What the file holds, where it could be read to its end.
-    pub notes: Option<Notes>,
+    pub notes: Option<Box<Notes>>,
 }
 
 impl From<Reason> for Refusal {
@@ -292,7 +292,7 @@ pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Refusal>
             let separator = if begins_with_place { "," } else { ":" };
             reason.message = format!("{format}{separator} {}", reason.message);
         }
-        Refusal { reason, notes: error.notes().cloned() }
+        Refusal { reason, notes: error.notes().cloned().map(Box::new) }
     })
 }
 

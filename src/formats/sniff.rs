@@ -67,7 +67,7 @@ fn is_binary_stl(bytes: &[u8]) -> bool {
 /// Whether a keyword of OFF is there, and numbers or the word BINARY after it.
 fn is_off(text: &[u8]) -> bool {
     let mut words = Words::new(text, 1).without_comments();
-    let is_keyword = words.next().is_some_and(|word| off::is_keyword(word));
+    let is_keyword = words.next().is_some_and(off::is_keyword);
     let next = words.next().unwrap_or_default();
     is_keyword && (integer(next).is_some() || next == b"BINARY")
 }

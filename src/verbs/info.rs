@@ -47,7 +47,7 @@ fn answer(job: &Job, settings: &Settings) -> Answer {
     let found = guard(|| {
         let found = decode(&job.path, &read_input(job, settings)?, settings, &Folder::of_job(job));
         let Content { soup, notes } = found.map_err(|refusal| {
-            content = refusal.notes;
+            content = refusal.notes.map(|notes| *notes);
             refusal.reason
         })?;
         content = Some(notes);

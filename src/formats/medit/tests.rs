@@ -95,7 +95,12 @@ fn broken_files_are_refused_with_code_and_place() {
         (good.replace("1 3 4 7", "1 3 5 7"), Code::Malformed, Some("line 15"), "\"5\" is no vertex: there are 4"),
         (good.replace("1 3 4 7", "0 3 4 7"), Code::Malformed, Some("line 15"), "in section Triangles"),
         (good.replace("Triangles\n2", "Triangles\n3"), Code::CountMismatch, Some("line 13"), "cut off"),
-        (square("Triangles\n2\n1 2 3 7\nCorners\n2\n1\n2\n"), Code::CountMismatch, Some("line 15"), "\"Corners\" stands"),
+        (
+            square("Triangles\n2\n1 2 3 7\nCorners\n2\n1\n2\n"),
+            Code::CountMismatch,
+            Some("line 15"),
+            "\"Corners\" stands",
+        ),
         (good.replace("Triangles\n2", "Triangles\n1"), Code::CountMismatch, Some("line 15"), "a keyword should"),
         (square(&format!("{TWO}Vertices\n0\n")), Code::Malformed, Some("line 17"), "another section Vertices"),
         (format!("{SQUARE}Triangles\n2\n1 2 3 7\n1 3      4"), Code::CountMismatch, Some("line 15"), "ends in section"),
