@@ -115,8 +115,8 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
             let mut notes = Notes::new("STL, ASCII");
             (ascii(unfilled(bytes), limit, &mut notes)?, notes)
         }
-        // Some programs append their own data.
-        Some(declared @ 1..) if needed(declared) < size && !is_text(bytes) => binary_file(bytes, declared, limit)?,
+        // Some programs append their own data. (Four letters of text would be a count of 7 GB and more.)
+        Some(declared @ 1..) if needed(declared) < size => binary_file(bytes, declared, limit)?,
         declared => return Err(mismatch(declared, bytes).into()),
     };
     let triangles = (0..facets.corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
