@@ -369,6 +369,123 @@ mod tests {
         }
     }
 
+    /// A triangle and a fourth point in every format, with another word in the place of `@` (the first corner's x) or `#`
+    /// (the fourth point's).
+    fn triangle(at: &str, hash: &str) -> Vec<(Format, Vec<u8>)> {
+        let points = "@ 0 0\n1 0 0\n0 1 0\n# 0 0\n";
+        let lines = |begin: &str, end: &str| -> String {
+            points.lines().zip(1..).map(|(p, i)| format!("{}{p}{end}\n", begin.replace('N', &i.to_string()))).collect()
+        };
+        let xml = |kind: &str, cells: &str| {
+            format!(
+                "<VTKFile type=\"{kind}\"><{kind}><Piece NumberOfPoints=\"4\" {cells}<Points><DataArray type=\"Float64\" \
+                 NumberOfComponents=\"3\" format=\"ascii\">{points}</DataArray></Points></Piece></{kind}></VTKFile>"
+            )
+        };
+        let ids = |name: &str, ids: &str| {
+            format!("<DataArray type=\"Int32\" Name=\"{name}\" format=\"ascii\">{ids}</DataArray>")
+        };
+        let list = ids("connectivity", "0 1 2") + &ids("offsets", "3");
+        let list_with_types = list.clone() + &ids("types", "5");
+        let texts = [
+            (Format::Obj, lines("v ", "") + "f 1 2 3\n"),
+            (
+                Format::Ply,
+                "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                 element face 1\nproperty list int int vertex_index\nend_header\n"
+                    .to_owned()
+                    + points
+                    + "3 0 1 2\n",
+            ),
+            (Format::Off, format!("OFF 4 1 0\n{points}3 0 1 2\n")),
+            (
+                Format::Medit,
+                format!("MeshVersionFormatted 2\nDimension 3\nVertices 4\n{}Triangles 1\n1 2 3 0\n", lines("", " 0")),
+            ),
+            (
+                Format::Vtk,
+                format!(
+                    "# vtk DataFile Version 3.0\n\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n{points}POLYGONS 1 4\n3 0 1 2\n"
+                ),
+            ),
+            (Format::Vtp, xml("PolyData", &format!("NumberOfPolys=\"1\"><Polys>{list}</Polys>"))),
+            (Format::Vtu, xml("UnstructuredGrid", &format!("NumberOfCells=\"1\"><Cells>{list_with_types}</Cells>"))),
+            (
+                Format::Msh,
+                format!(
+                    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n{}$EndNodes\n$Elements\n1\n1 2 0 1 2 3\n$EndElements\n",
+                    lines("N ", "")
+                ),
+            ),
+            (
+                Format::Msh,
+                format!(
+                    "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n2 1 0 4\n1\n2\n3\n4\n{points}$EndNodes\n\
+                     $Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n"
+                ),
+            ),
+        ];
+        let word = |text: String| {
+            let text = if text.starts_with("# vtk") { text.replacen("# vtk", "\u{1} vtk", 1) } else { text };
+            text.replace('@', at).replace('#', hash).replace('\u{1}', "#").into_bytes()
+        };
+        texts.into_iter().map(|(format, text)| (format, word(text))).collect()
+    }
+
+    /// Also with a document of glTF, which is no text.
+    #[test]
+    fn points_that_no_triangle_uses_refuse_no_file_of_any_format() {
+        let document = |at: f32, hash: f32| {
+            let data = [at, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, hash, 0.0, 0.0].map(f32::to_le_bytes).concat();
+            let data = [data, vec![0, 1, 2, 0]].concat();
+            let uri = format!("data:;base64,{}", base64::Engine::encode(&base64::prelude::BASE64_STANDARD, data));
+            let document = serde_json::json!({
+                "asset": {"version": "2.0"}, "buffers": [{"byteLength": 52, "uri": uri}],
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+                "accessors": [
+                    {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+                    {"bufferView": 1, "componentType": 5121, "count": 3, "type": "SCALAR"}
+                ],
+                "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 4}]
+            });
+            (Format::Gltf, document.to_string().into_bytes())
+        };
+        let with = |at: &str, hash: &str| {
+            let number = |word: &str| word.parse().unwrap_or(f32::NAN);
+            let mut files = triangle(at, hash);
+            files.push(document(number(at), number(hash)));
+            files
+        };
+        for bad in ["nan", "-inf", "1e999", "-nan(ind)"] {
+            for (format, bytes) in with("0", bad) {
+                let soup = read_alone(format, &bytes).unwrap_or_else(|e| panic!("{format}, {bad}: {e}")).soup;
+                assert_eq!((soup.points().len(), soup.points()[1]), (4, [1.0, 0.0, 0.0]), "{format}");
+                let repaired = pipeline::repair(&soup, &Default::default()).expect("a triangle");
+                assert_eq!(repaired.report.unreferenced_points, 1, "{format}");
+            }
+            for (format, bytes) in with(bad, "0") {
+                let reason = read_alone(format, &bytes).expect_err(bad).reason();
+                assert_eq!(reason.code, Code::NotFinite, "{format}: {}", reason.message);
+                assert!(reason.message.contains("1 corner is of this sort"), "{format}: {}", reason.message);
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_of_other_habits_are_refused_by_name_in_every_text() {
+        let facet = "solid\nfacet normal 0 0 1\nouter loop\nvertex @ 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid";
+        for (word, told) in [("0,5", "decimal comma"), ("5.0D-01", "Fortran exponent"), ("1.5+100", "Fortran exponent")]
+        {
+            let mut files = triangle(word, "0");
+            files.push((Format::Stl, facet.replace('@', word).into_bytes()));
+            for (format, bytes) in files {
+                let reason = read_alone(format, &bytes).expect_err(word).reason();
+                assert!(reason.message.contains(told) && reason.message.contains(word), "{format}: {}", reason.message);
+                assert!(reason.code == Code::Malformed && reason.place.is_some(), "{format}: {reason:?}");
+            }
+        }
+    }
+
     #[test]
     fn what_no_reader_reads_is_told_by_name() {
         let utf16: Vec<u8> = "\u{feff}v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
