@@ -36,7 +36,7 @@ pub enum Verb {
 /// `planish run`
 #[derive(Debug, Args)]
 pub struct Run {
-    /// Files (.stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh), or folders of them
+    /// Files (.stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh .off .mesh), or folders of them
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     /// Shared options
@@ -50,7 +50,7 @@ pub struct Run {
 /// `planish watch`
 #[derive(Debug, Args)]
 pub struct Watch {
-    /// Folder into which files (.stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh) are dropped
+    /// Folder into which files (.stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh .off .mesh) are dropped
     #[arg(value_name = "INBOX")]
     pub inbox: PathBuf,
     /// Look at the inbox every second, instead of being told by the system: for network folders
@@ -170,7 +170,7 @@ impl Check {
 /// `planish info`
 #[derive(Debug, Args)]
 pub struct Info {
-    /// Files (.stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh), or folders of them
+    /// Files (.stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh .off .mesh), or folders of them
     #[arg(required = true, value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
     /// Print JSON: one object per input and line

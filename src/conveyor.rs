@@ -251,7 +251,13 @@ fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, 
         };
         Ok(match older {
             Some(older) => Err(older),
-            None => Ok(stages::decode(&travel.job.path, &bytes, settings, &folder)?),
+            None => {
+                let content = stages::decode(&travel.job.path, &bytes, settings, &folder);
+                Ok(content.map_err(|refusal| {
+                    report.content = refusal.notes.map(|notes| *notes);
+                    refusal.reason
+                })?)
+            }
         })
     });
     travel.job.set_beside(folder.asked());
@@ -284,6 +290,10 @@ fn warn_of_doubts(travel: &Travel, notes: &Notes) {
             "polygons cross themselves, or are too intricate: the triangles they were cut into may fold; export the \
              surface as triangles"
         );
+    }
+    for remark in &notes.remarks {
+        let _in_stage = travel.in_stage(Stage::Read);
+        tracing::warn!("{remark}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! What each stage does with an input: values in, values out. The threads are in [`crate::conveyor`].
 
-use crate::formats::{self, Beside, Content, Kind, READ, Source, vtm, vtp, vtu};
+use crate::formats::{self, Beside, Content, Kind, READ, Refusal, Source, vtm, vtp, vtu};
 use crate::hand_off;
 use crate::job::{Job, Stopped};
 use crate::look::Look;
@@ -71,8 +71,8 @@ fn unreadable(error: OpenError) -> Reason {
 ///
 /// # Errors
 /// The refusal, with the place and what to do.
-pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -> Result<Content, Reason> {
-    let refuse = |code, message: String| Err(Reason::at(code, message, Some("file name".to_owned())));
+pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -> Result<Content, Refusal> {
+    let refuse = |code, message: String| Err(Reason::at(code, message, Some("file name".to_owned())).into());
     match formats::kind(path) {
         Kind::Mesh(format) => {
             let source = Source { bytes, limits: &settings.limits, beside: folder };

@@ -153,7 +153,7 @@ const MALFORMED: [(&str, Code, &str); 13] = [
     ("msh_empty.msh", Code::NoTriangles, "MSH: the file holds no triangle"),
     ("msh_truncated_derived.msh", Code::CountMismatch, "MSH, line 3179: the file ends in section $Nodes"),
     ("obj_index_out_of_range.obj", Code::Malformed, "OBJ, line 20: a face uses vertex 8, but the file has 6"),
-    ("obj_inf_nan.obj", Code::NotFinite, "OBJ, line 1 has the coordinate inf"),
+    ("obj_inf_nan.obj", Code::NotFinite, "OBJ, line 1: x of point 0 (from 0) is inf, and triangle 0"),
     ("obj_zero_bytes.obj", Code::EmptyFile, "the file is empty (0 bytes)"),
     ("ply_truncated.ply", Code::CountMismatch, "PLY, line 46: the header declares 12 of element vertex"),
     ("ply_wrong_face_count.ply", Code::CountMismatch, "PLY, byte 2160: the file ends in face 20 (from 0) of 22"),

@@ -15,7 +15,7 @@ fn refusals_say_where_and_what_to_do() {
     nan[84 + 50 + 12..84 + 50 + 16].copy_from_slice(&f32::NAN.to_le_bytes());
     let mut empty = binary[..84].to_vec();
     empty[80..].fill(0);
-    let cases: [(&str, &[u8], Code, Option<&str>); 11] = [
+    let cases: [(&str, &[u8], Code, Option<&str>); 12] = [
         ("empty.stl", b"", Code::EmptyFile, Some("byte 0")),
         ("zero.stl", &empty, Code::NoTriangles, None),
         ("cut.stl", &binary[..1000], Code::CountMismatch, Some("byte 80")),
@@ -25,7 +25,8 @@ fn refusals_say_where_and_what_to_do() {
         ("word.stl", b"solid\nfacet normal 0 0 1\nouter loop\nvertex a 0 0\n", Code::Malformed, Some("line 4")),
         ("flat.obj", b"v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\n", Code::OnlyDegenerate, None),
         ("part.xyz", b"1 2 3", Code::UnknownExtension, Some("file name")),
-        ("part.off", b"OFF\n", Code::UnsupportedFormat, Some("file name")),
+        ("part.meshb", b"MESH", Code::UnsupportedFormat, Some("file name")),
+        ("part.off", b"OFF BINARY\n", Code::UnsupportedFormat, Some("line 1")),
         ("part.mtl", b"newmtl a\n", Code::NotAMesh, Some("file name")),
     ];
     for (name, bytes, code, place) in cases {
@@ -38,6 +39,34 @@ fn refusals_say_where_and_what_to_do() {
         assert_eq!(std::fs::read_dir(out.of(name)).expect("a folder").count(), 1, "nothing but the report");
         assert!(report.outputs.is_empty());
     }
+}
+
+/// What is not as it should be, but read all the same, is told on the terminal and in the report; of volumes alone it is
+/// told what they are.
+#[test]
+fn remarks_and_contents_reach_terminal_and_report() {
+    let mut appended = std::fs::read(fixture("disk.stl")).expect("a fixture");
+    appended.extend(b"some program's own data");
+    let (ended, report) = Out::new().run_bytes("appended.stl", &appended);
+    let remarks = report.content.expect("read").remarks;
+    assert_eq!((ended.code, report.status, remarks.len()), (Some(0), Status::Certified, 1));
+    assert!(remarks[0].starts_with("23 bytes follow") && ended.err.contains(&remarks[0]), "{}", ended.err);
+    let tetrahedron = b"MeshVersionFormatted 2\nDimension 3\nVertices\n4\n0 0 0 1\n1 0 0 1\n0 1 0 1\n0 0 1 1\n\
+                        Tetrahedra\n1\n1 2 3 4 1\nEnd\n";
+    let (ended, report) = Out::new().run_bytes("volume.mesh", tetrahedron);
+    assert_eq!(report.reason.expect("a reason").code, Code::NoTriangles);
+    assert_eq!(report.content.expect("it was read to its end").skipped["tetrahedron"], 1);
+    assert!(ended.err.contains("only 1 tetrahedron; their surface must be saved"), "{}", ended.err);
+}
+
+/// A scanner's invalid points do no harm where no triangle has them.
+#[test]
+fn points_without_triangles_are_counted_whatever_their_coordinates_are() {
+    let file = "v nan nan nan\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 inf\nv nan nan nan\nf 2 3 4\n";
+    let (ended, report) = Out::new().run_bytes("scan.obj", file.as_bytes());
+    assert_eq!((ended.code, report.status), (Some(0), Status::Certified), "{}", ended.err);
+    let repairs = report.repairs.expect("repaired");
+    assert_eq!((repairs.unreferenced_points, repairs.welded), (3, 0));
 }
 
 /// As one chart, the area ratio of this finger would be e^88.

@@ -120,6 +120,9 @@ pub struct Notes {
     pub mid_nodes: usize,
     /// What is no surface and was left out: how many elements of each kind.
     pub skipped: BTreeMap<String, usize>,
+    /// What is not as it should be, but was read all the same: sentences for people.
+    #[serde(default)]
+    pub remarks: Vec<String>,
 }
 
 impl Notes {
@@ -140,6 +143,11 @@ impl Notes {
     pub fn polygon(&mut self, is_doubtful: bool) {
         self.polygons += 1;
         self.polygons_doubtful += usize::from(is_doubtful);
+    }
+
+    /// Tells of something that is not as it should be.
+    pub fn remark(&mut self, remark: String) {
+        self.remarks.push(remark);
     }
 
     /// Counts elements that are left out.

@@ -1,13 +1,16 @@
 //! File formats: which there are, and reading a soup of triangles from the bytes of a file.
 
 mod content;
+mod finish;
 mod gltf;
 pub mod gmsh;
+mod medit;
 mod msh;
 #[cfg(test)]
 #[path = "../../tests/fuzz/mutate/mod.rs"]
 mod mutate;
 mod obj;
+mod off;
 mod patches;
 mod place;
 mod ply;
@@ -22,6 +25,7 @@ use crate::outcome::{Code, Reason};
 pub use content::{Beside, Content, Limits, Notes, Nothing, Source, TooMany};
 pub use patches::Patches;
 use pipeline::mesh::SoupError;
+use place::Place;
 use std::path::Path;
 pub use vtk::{vtm, vtp, vtu};
 
@@ -44,6 +48,10 @@ pub enum Format {
     Ply,
     /// MSH of Gmsh, ASCII or binary.
     Msh,
+    /// Object File Format of Geomview.
+    Off,
+    /// The text format of MEDIT (`.mesh`).
+    Medit,
 }
 
 impl Format {
@@ -55,7 +63,7 @@ impl Format {
             // Records of one size in binary files. Text takes five times as much.
             Self::Stl => 50,
             // Quads in text of six decimals: 30. Triangles: 37.
-            Self::Obj => 30,
+            Self::Obj | Self::Off => 30,
             // Binary quads: 14.5. Binary triangles: 19. Text: 37.
             Self::Ply => 14,
             // Indices of 16 bits: 12. Of 32 bits: 18.
@@ -66,6 +74,8 @@ impl Format {
             Self::Vtu | Self::Vtp => 9,
             // Binary quads of version 2: 28, of version 4: 36. Triangles: 38 and 48.
             Self::Msh => 28,
+            // Quads in text of six decimals, each line with a reference: 34.
+            Self::Medit => 34,
         }
     }
 }
@@ -84,10 +94,10 @@ pub enum Kind {
 }
 
 /// Extensions of meshes in formats that this version does not read.
-const OTHER_MESHES: [&str; 1] = ["off"];
+const OTHER_MESHES: [&str; 1] = ["meshb"];
 
 /// The extensions that planish reads, as people are told.
-pub const READ: &str = ".stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh";
+pub const READ: &str = ".stl .obj .ply .gltf .glb .vtk .vtu .vtp .msh .off .mesh";
 
 /// Extensions of what lies beside meshes, or only names them.
 const NO_MESHES: [&str; 16] = [
@@ -123,6 +133,8 @@ pub fn kind(path: &Path) -> Kind {
         "vtp" => Kind::Mesh(Format::Vtp),
         "ply" => Kind::Mesh(Format::Ply),
         "msh" => Kind::Mesh(Format::Msh),
+        "off" => Kind::Mesh(Format::Off),
+        "mesh" => Kind::Mesh(Format::Medit),
         e if OTHER_MESHES.contains(&e) => Kind::OtherMesh(extension),
         e if NO_MESHES.contains(&e) => Kind::NoMesh,
         _ => Kind::Unknown(extension),
@@ -161,9 +173,32 @@ pub enum ReadError {
     /// Not an MSH file.
     #[error(transparent)]
     Msh(#[from] msh::MshError),
-    /// What was read makes no sense.
+    /// Not an OFF file.
     #[error(transparent)]
-    Soup(#[from] SoupError),
+    Off(#[from] off::OffError),
+    /// Not a file of MEDIT.
+    #[error(transparent)]
+    Medit(#[from] medit::MeditError),
+    /// There are elements, but none of a surface.
+    #[error("the file holds no surface, only {found}; {remedy}")]
+    NoSurface {
+        /// What there is.
+        found: String,
+        /// What to do.
+        remedy: &'static str,
+        /// What else there is to tell.
+        notes: Box<Notes>,
+    },
+    /// What was read makes no sense.
+    #[error("{}{error}", place.map(|p| format!("{p}: ")).unwrap_or_default())]
+    Soup {
+        /// Why.
+        error: SoupError,
+        /// The line or byte, where there is one.
+        place: Option<Place>,
+        /// What else there is to tell.
+        notes: Box<Notes>,
+    },
 }
 
 impl ReadError {
@@ -178,9 +213,44 @@ impl ReadError {
             Self::Vtk(e) => (e.code(), e.place()),
             Self::Ply(e) => (e.code(), e.place()),
             Self::Msh(e) => (e.code(), e.place()),
-            Self::Soup(e) => soup_reason(e),
+            Self::Off(e) => (e.code(), e.place()),
+            Self::Medit(e) => (e.code(), e.place()),
+            Self::NoSurface { .. } => (Code::NoTriangles, None),
+            Self::Soup { error, place, .. } => {
+                let (code, element) = soup_reason(error);
+                (code, place.map(|p| p.to_string()).or(element))
+            }
         };
         Reason::at(code, self, place)
+    }
+
+    /// What the file holds beside a surface, where it could be read to its end.
+    pub fn notes(&self) -> Option<&Notes> {
+        match self {
+            Self::NoSurface { notes, .. } | Self::Soup { notes, .. } => Some(notes),
+            _ => None,
+        }
+    }
+}
+
+/// A refusal, with what could be read all the same.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// Why.
+    pub reason: Reason,
+    /// What the file holds, where it could be read to its end.
+    pub notes: Option<Box<Notes>>,
+}
+
+impl From<Reason> for Refusal {
+    fn from(reason: Reason) -> Self {
+        Self { reason, notes: None }
+    }
+}
+
+impl From<Refusal> for Reason {
+    fn from(refusal: Refusal) -> Self {
+        refusal.reason
     }
 }
 
@@ -204,6 +274,8 @@ impl std::fmt::Display for Format {
             Self::Vtp => "VTP",
             Self::Ply => "PLY",
             Self::Msh => "MSH",
+            Self::Off => "OFF",
+            Self::Medit => "MEDIT",
         })
     }
 }
@@ -212,7 +284,7 @@ impl std::fmt::Display for Format {
 ///
 /// # Errors
 /// The refusal.
-pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Reason> {
+pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Refusal> {
     read(format, source).map_err(|error| {
         let mut reason = error.reason();
         // Those are in no format.
@@ -222,7 +294,7 @@ pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Reason> 
             let separator = if begins_with_place { "," } else { ":" };
             reason.message = format!("{format}{separator} {}", reason.message);
         }
-        reason
+        Refusal { reason, notes: error.notes().cloned().map(Box::new) }
     })
 }
 
@@ -249,6 +321,8 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
         Format::Vtk | Format::Vtu | Format::Vtp => vtk::read(&unmarked),
         Format::Ply => ply::read(&unmarked),
         Format::Msh => msh::read(&unmarked),
+        Format::Off => off::read(&unmarked),
+        Format::Medit => medit::read(&unmarked),
     }
 }
 
@@ -263,7 +337,8 @@ pub fn read_patches(format: Format, source: &Source) -> Result<Patches, ReadErro
         return msh::read_patches(&Source { bytes, ..*source });
     }
     let soup = read(format, source)?.soup;
-    Ok(Patches::new(soup.points().to_vec(), soup.triangles().to_vec(), vec![], None)?)
+    let triangles = soup.triangles().len();
+    Ok(Patches::new(&soup, vec![None; triangles], None))
 }
 
 /// As [`read`], with the usual limits and nothing beside the file.
@@ -284,7 +359,9 @@ mod tests {
         assert_eq!(kind(Path::new("scan.obj")), Kind::Mesh(Format::Obj));
         assert_eq!(kind(Path::new("scan.ply")), Kind::Mesh(Format::Ply));
         assert_eq!(kind(Path::new("Part.Msh")), Kind::Mesh(Format::Msh));
-        assert_eq!(kind(Path::new("scan.off")), Kind::OtherMesh("off".to_owned()));
+        assert_eq!(kind(Path::new("scan.OFF")), Kind::Mesh(Format::Off));
+        assert_eq!(kind(Path::new("part.mesh")), Kind::Mesh(Format::Medit));
+        assert_eq!(kind(Path::new("part.meshb")), Kind::OtherMesh("meshb".to_owned()));
         for (name, format) in [("a.vtk", Format::Vtk), ("a.vtu", Format::Vtu), ("a.VTP", Format::Vtp)] {
             assert_eq!(kind(Path::new(name)), Kind::Mesh(format));
         }
@@ -309,6 +386,123 @@ mod tests {
         }
     }
 
+    /// A triangle and a fourth point in every format, with another word in the place of `@` (the first corner's x) or `#`
+    /// (the fourth point's).
+    fn triangle(at: &str, hash: &str) -> Vec<(Format, Vec<u8>)> {
+        let points = "@ 0 0\n1 0 0\n0 1 0\n# 0 0\n";
+        let lines = |begin: &str, end: &str| -> String {
+            points.lines().zip(1..).map(|(p, i)| format!("{}{p}{end}\n", begin.replace('N', &i.to_string()))).collect()
+        };
+        let xml = |kind: &str, cells: &str| {
+            format!(
+                "<VTKFile type=\"{kind}\"><{kind}><Piece NumberOfPoints=\"4\" {cells}<Points><DataArray type=\"Float64\" \
+                 NumberOfComponents=\"3\" format=\"ascii\">{points}</DataArray></Points></Piece></{kind}></VTKFile>"
+            )
+        };
+        let ids = |name: &str, ids: &str| {
+            format!("<DataArray type=\"Int32\" Name=\"{name}\" format=\"ascii\">{ids}</DataArray>")
+        };
+        let list = ids("connectivity", "0 1 2") + &ids("offsets", "3");
+        let list_with_types = list.clone() + &ids("types", "5");
+        let texts = [
+            (Format::Obj, lines("v ", "") + "f 1 2 3\n"),
+            (
+                Format::Ply,
+                "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                 element face 1\nproperty list int int vertex_index\nend_header\n"
+                    .to_owned()
+                    + points
+                    + "3 0 1 2\n",
+            ),
+            (Format::Off, format!("OFF 4 1 0\n{points}3 0 1 2\n")),
+            (
+                Format::Medit,
+                format!("MeshVersionFormatted 2\nDimension 3\nVertices 4\n{}Triangles 1\n1 2 3 0\n", lines("", " 0")),
+            ),
+            (
+                Format::Vtk,
+                format!(
+                    "# vtk DataFile Version 3.0\n\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n{points}POLYGONS 1 4\n3 0 1 2\n"
+                ),
+            ),
+            (Format::Vtp, xml("PolyData", &format!("NumberOfPolys=\"1\"><Polys>{list}</Polys>"))),
+            (Format::Vtu, xml("UnstructuredGrid", &format!("NumberOfCells=\"1\"><Cells>{list_with_types}</Cells>"))),
+            (
+                Format::Msh,
+                format!(
+                    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n{}$EndNodes\n$Elements\n1\n1 2 0 1 2 3\n$EndElements\n",
+                    lines("N ", "")
+                ),
+            ),
+            (
+                Format::Msh,
+                format!(
+                    "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n2 1 0 4\n1\n2\n3\n4\n{points}$EndNodes\n\
+                     $Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n"
+                ),
+            ),
+        ];
+        let word = |text: String| {
+            let text = if text.starts_with("# vtk") { text.replacen("# vtk", "\u{1} vtk", 1) } else { text };
+            text.replace('@', at).replace('#', hash).replace('\u{1}', "#").into_bytes()
+        };
+        texts.into_iter().map(|(format, text)| (format, word(text))).collect()
+    }
+
+    /// Also with a document of glTF, which is no text.
+    #[test]
+    fn points_that_no_triangle_uses_refuse_no_file_of_any_format() {
+        let document = |at: f32, hash: f32| {
+            let data = [at, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, hash, 0.0, 0.0].map(f32::to_le_bytes).concat();
+            let data = [data, vec![0, 1, 2, 0]].concat();
+            let uri = format!("data:;base64,{}", base64::Engine::encode(&base64::prelude::BASE64_STANDARD, data));
+            let document = serde_json::json!({
+                "asset": {"version": "2.0"}, "buffers": [{"byteLength": 52, "uri": uri}],
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+                "accessors": [
+                    {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+                    {"bufferView": 1, "componentType": 5121, "count": 3, "type": "SCALAR"}
+                ],
+                "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 4}]
+            });
+            (Format::Gltf, document.to_string().into_bytes())
+        };
+        let with = |at: &str, hash: &str| {
+            let number = |word: &str| word.parse().unwrap_or(f32::NAN);
+            let mut files = triangle(at, hash);
+            files.push(document(number(at), number(hash)));
+            files
+        };
+        for bad in ["nan", "-inf", "1e999", "-nan(ind)"] {
+            for (format, bytes) in with("0", bad) {
+                let soup = read_alone(format, &bytes).unwrap_or_else(|e| panic!("{format}, {bad}: {e}")).soup;
+                assert_eq!((soup.points().len(), soup.points()[1]), (4, [1.0, 0.0, 0.0]), "{format}");
+                let repaired = pipeline::repair(&soup, &Default::default()).expect("a triangle");
+                assert_eq!(repaired.report.unreferenced_points, 1, "{format}");
+            }
+            for (format, bytes) in with(bad, "0") {
+                let reason = read_alone(format, &bytes).expect_err(bad).reason();
+                assert_eq!(reason.code, Code::NotFinite, "{format}: {}", reason.message);
+                assert!(reason.message.contains("1 corner is of this sort"), "{format}: {}", reason.message);
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_of_other_habits_are_refused_by_name_in_every_text() {
+        let facet = "solid\nfacet normal 0 0 1\nouter loop\nvertex @ 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid";
+        for (word, told) in [("0,5", "decimal comma"), ("5.0D-01", "Fortran exponent"), ("1.5+100", "Fortran exponent")]
+        {
+            let mut files = triangle(word, "0");
+            files.push((Format::Stl, facet.replace('@', word).into_bytes()));
+            for (format, bytes) in files {
+                let reason = read_alone(format, &bytes).expect_err(word).reason();
+                assert!(reason.message.contains(told) && reason.message.contains(word), "{format}: {}", reason.message);
+                assert!(reason.code == Code::Malformed && reason.place.is_some(), "{format}: {reason:?}");
+            }
+        }
+    }
+
     #[test]
     fn what_no_reader_reads_is_told_by_name() {
         let utf16: Vec<u8> = "\u{feff}v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
@@ -319,8 +513,8 @@ mod tests {
             (b"PK\x03\x04\x14\0", "zip"),
             (b"\n<!DOCTYPE html>\n<html>", "web page"),
             (b"(0 \"GAMBIT to Fluent File\")\n", "Fluent"),
-            (b"MeshVersionFormatted 2\n", "MEDIT"),
-            (b"OFF\n3 1 0\n", "OFF"),
+            (b"\x01\0\0\0\x02\0\0\0\x03\0\0\0", "MEDIT"),
+            (b"\0\0\0\x01\0\0\0\x04\0\0\0\x03", "MEDIT"),
             (b"ISO-10303-21;\n", "STEP"),
         ];
         for (bytes, what) in rows {

@@ -1,10 +1,9 @@
 //! A mesh with what its file tells of its elements.
 
-use pipeline::mesh::{SoupError, TriangleSoup};
+use pipeline::mesh::TriangleSoup;
 use pipeline::space::Vec3;
 
-/// Triangles, each with the surface that it was made on, and the nodes in the middle of its sides. All corners and nodes in
-/// the middle of sides exist, and there is a triangle.
+/// Triangles, each with the surface that it was made on, and the nodes in the middle of its sides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patches {
     points: Vec<Vec3>,
@@ -14,21 +13,11 @@ pub struct Patches {
 }
 
 impl Patches {
-    /// Triangles; `mids` may be empty, where no triangle has six nodes.
-    ///
-    /// # Errors
-    /// As [`TriangleSoup::new`].
-    pub fn new(
-        points: Vec<Vec3>,
-        triangles: Vec<[u32; 3]>,
-        mut mids: Vec<Option<[u32; 3]>>,
-        surfaces: Option<Vec<i64>>,
-    ) -> Result<Self, SoupError> {
-        mids.resize(triangles.len(), None);
-        // Whatever is a node of an element must be a point that can be.
-        let of_mids = mids.iter().flatten().copied();
-        let soup = TriangleSoup::new(points, triangles.iter().copied().chain(of_mids).collect())?;
-        Ok(Self { points: soup.points().to_vec(), triangles, mids, surfaces })
+    /// The first triangles of `soup`, as many as there are `mids`. What follows in the soup are those nodes: all of them are
+    /// points that can be.
+    pub fn new(soup: &TriangleSoup, mids: Vec<Option<[u32; 3]>>, surfaces: Option<Vec<i64>>) -> Self {
+        let triangles = soup.triangles()[..mids.len()].to_vec();
+        Self { points: soup.points().to_vec(), triangles, mids, surfaces }
     }
 
     /// The points, in the order of the file.

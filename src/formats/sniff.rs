@@ -1,6 +1,7 @@
 //! What the first bytes of a file say about its format, where that is beyond doubt: files are given wrong extensions.
 
-use super::Format;
+use super::words::{Words, integer};
+use super::{Format, off};
 
 /// How far a word that decides is looked for.
 const FAR: usize = 1024;
@@ -14,6 +15,8 @@ pub(super) fn sniff(bytes: &[u8]) -> Option<Format> {
         _ if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") => Some(Format::Ply),
         _ if text.starts_with(b"# vtk DataFile") => Some(Format::Vtk),
         _ if text.starts_with(b"$MeshFormat") => Some(Format::Msh),
+        _ if is_word(text, "MeshVersionFormatted") => Some(Format::Medit),
+        _ if is_off(text) => Some(Format::Off),
         _ if text.starts_with(b"glTF") => Some(Format::Gltf),
         _ if text.starts_with(b"{") && has("\"asset\"") => Some(Format::Gltf),
         _ if text.starts_with(b"<") && has("<VTKFile") && has("UnstructuredGrid") => Some(Format::Vtu),
@@ -41,8 +44,10 @@ pub(super) fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
         [0x1f, 0x8b, 8, ..] => Some(("compressed by gzip", "unpack it first")),
         [b'P', b'K', 3, 4, ..] => Some(("a zip archive", "unpack it first")),
         [b'(', b'0' | b'1', b' ', ..] => Some(("a mesh of ANSYS Fluent", CONVERT)),
-        _ if page.starts_with(b"meshversionformatted") => Some(("a mesh of MEDIT (.mesh)", CONVERT)),
-        _ if page.starts_with(b"off") && is_word(&page, "off") => Some(("a mesh in the format OFF", CONVERT)),
+        // The number 1, which tells the order of bytes; the version; the keyword of the dimension.
+        [1, 0, 0, 0, 1..=4, 0, 0, 0, 3, 0, 0, 0, ..] | [0, 0, 0, 1, 0, 0, 0, 1..=4, 0, 0, 0, 3, ..] => {
+            Some(("a binary mesh of MEDIT (.meshb)", "save it as text (.mesh)"))
+        }
         _ if page.starts_with(b"iso-10303-21") => {
             Some(("a STEP file and no mesh", "mesh it first, with Gmsh for example"))
         }
@@ -57,6 +62,14 @@ pub(super) fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
 fn is_binary_stl(bytes: &[u8]) -> bool {
     let count = bytes.get(80..84).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
     count > 0 && bytes.len() as u64 == 84 + 50 * u64::from(count)
+}
+
+/// Whether a keyword of OFF is there, and numbers or the word BINARY after it.
+fn is_off(text: &[u8]) -> bool {
+    let mut words = Words::new(text, 1).without_comments();
+    let is_keyword = words.next().is_some_and(off::is_keyword);
+    let next = words.next().unwrap_or_default();
+    is_keyword && (integer(next).is_some() || next == b"BINARY")
 }
 
 /// The statements with which OBJ files begin.
@@ -96,10 +109,15 @@ mod tests {
             [(2, 184), (2, 185), (0, 84)].map(|(n, size)| sniff(&binary(n, size))),
             [Some(Format::Stl), None, None]
         );
-        let cases: [(&[u8], Option<Format>); 19] = [
+        let cases: [(&[u8], Option<Format>); 24] = [
             (b"ply\nformat ascii 1.0\n", Some(Format::Ply)),
             (b"# vtk DataFile Version 3.0\n", Some(Format::Vtk)),
             (b"$MeshFormat\n4.1 0 8\n", Some(Format::Msh)),
+            (b"MeshVersionFormatted 2\n", Some(Format::Medit)),
+            (b"OFF\n3 1 0\n", Some(Format::Off)),
+            (b"STCNOFF # by hand\n\n3 1 0\n", Some(Format::Off)),
+            (b"OFF BINARY\n\0\0", Some(Format::Off)),
+            (b"off the record\n", None),
             (b"glTF\x02\0\0\0", Some(Format::Gltf)),
             (b" {\"asset\": {\"version\": \"2.0\"}}", Some(Format::Gltf)),
             (b"<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\">", Some(Format::Vtp)),

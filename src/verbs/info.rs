@@ -1,6 +1,7 @@
 //! `planish info`: what is this surface?
 
 use super::{Exit, say, say_json, shown};
+use crate::formats::{Content, Notes};
 use crate::inputs;
 use crate::job::Job;
 use crate::outcome::Reason;
@@ -14,6 +15,7 @@ use std::path::{Path, PathBuf};
 #[derive(Serialize)]
 struct Answer {
     input: String,
+    content: Option<Notes>,
     surface: Option<Surface>,
     repairs: Option<Repairs>,
     warnings: Vec<Warning>,
@@ -42,8 +44,15 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
 
 fn answer(job: &Job, settings: &Settings) -> Answer {
     let input = job.path.to_string_lossy().into_owned();
+    let mut content = None;
     let found = guard(|| {
-        repaired(&decode(&job.path, &read_input(job, settings)?, settings, &Folder::of_job(job))?.soup, settings)
+        let found = decode(&job.path, &read_input(job, settings)?, settings, &Folder::of_job(job));
+        let Content { soup, notes } = found.map_err(|refusal| {
+            content = refusal.notes.map(|notes| *notes);
+            refusal.reason
+        })?;
+        content = Some(notes);
+        repaired(&soup, settings)
     });
     match found {
         Ok(found) => Answer {
@@ -51,9 +60,10 @@ fn answer(job: &Job, settings: &Settings) -> Answer {
             repairs: Some(report::repairs(&found.report)),
             warnings: report::warnings(&found),
             input,
+            content,
             reason: check_sheets(&found).err(),
         },
-        Err(reason) => Answer { input, surface: None, repairs: None, warnings: vec![], reason: Some(reason) },
+        Err(reason) => Answer { input, content, surface: None, repairs: None, warnings: vec![], reason: Some(reason) },
     }
 }
 
@@ -71,6 +81,7 @@ fn text(answer: &Answer, input: &Path) -> String {
     }
     lines.extend(answer.repairs.iter().flat_map(repairs));
     lines.extend(answer.warnings.iter().map(|w| format!("  warning  {}", w.message)));
+    lines.extend(answer.content.iter().flat_map(|notes| &notes.remarks).map(|remark| format!("  {remark}")));
     lines.join("\n")
 }
 

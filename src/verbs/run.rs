@@ -41,6 +41,7 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     if !settings.quiet {
         super::say(&table(&rows).to_string());
         rows.iter().for_each(|(job, end)| tell_doubts(job, end));
+        rows.iter().for_each(|(job, end)| tell_remarks(job, end));
     }
     rows.iter().for_each(|(job, end)| tell_trouble(job, end));
     let is_good = |end: &End| matches!(end, End::Done(done) if done.report.status == Status::Certified);
@@ -135,6 +136,12 @@ fn cells(name: String, done: &Done) -> Vec<String> {
         ratio.map_or(String::new(), |r| if r < 1e4 { format!("{r:.1}") } else { format!("{r:.1e}") }),
         format!("{:.2}", report.timing.values().sum::<f64>()),
     ]
+}
+
+/// Says on standard error what of an input was not as it should be, but was read all the same.
+fn tell_remarks(job: &Job, end: &End) {
+    let End::Done(Done { report: Report { content: Some(content), .. }, .. }) = end else { return };
+    content.remarks.iter().for_each(|remark| complain(&format!("{}: {remark}", shown(&job.path))));
 }
 
 /// Says on standard error what was wrong with an input.

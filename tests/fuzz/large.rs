@@ -268,6 +268,35 @@ fn msh() -> Vec<(&'static str, String)> {
     ]
 }
 
+fn off() -> Vec<(&'static str, String)> {
+    let points = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+    let nan = "nan 0 0\n".repeat(5 * MANY);
+    let star: String = star(MANY).map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    vec![
+        ("a polygon", format!("OFF {MANY} 1 0\n{star}{MANY}{}\n", many(MANY, |i| format!(" {i}")))),
+        ("points that are none", format!("OFF {} 1 0\n{nan}3 0 1 2\n", 5 * MANY)),
+        ("unused points that are none", format!("OFF {} 1 0\n{points}{nan}3 0 1 2\n", 5 * MANY + 4)),
+        ("comments", format!("OFF\n{}4 1 0\n{points}3 0 1 2\n", "# a comment\n".repeat(5 * MANY))),
+        ("a long line", format!("OFF 4 1 0\n{points}3 0 1 2{}\n", " 1".repeat(10 * MANY))),
+        ("empty faces", format!("OFF 4 {} 0\n{points}{}", 5 * MANY, "0\n".repeat(5 * MANY))),
+    ]
+}
+
+fn medit() -> Vec<(&'static str, String)> {
+    let begin = "MeshVersionFormatted 2 Dimension 3 ";
+    let points = "Vertices 3 0 0 0 1 1 0 0 1 0 1 0 1 ";
+    let triangle = "Triangles 1 1 2 3 0 ";
+    vec![
+        ("sections", format!("{begin}{points}{}", triangle.repeat(MANY))),
+        ("sections before their vertices", format!("{begin}{}{points}", triangle.repeat(MANY))),
+        ("empty sections that wait", format!("{begin}{}{points}", "Triangles ".repeat(MANY))),
+        ("keywords", format!("{begin}{points}{triangle}{}", "A ".repeat(10 * MANY))),
+        ("quotes", format!("{begin}{points}{triangle}Identifier {}", "\"a b\" ".repeat(5 * MANY))),
+        ("curved", format!("{begin}{points}TrianglesP2 {MANY} {}", "1 2 3 1 2 3 0 ".repeat(MANY))),
+        ("volumes", format!("{begin}{points}Tetrahedra {MANY} {}", "1 2 3 1 0 ".repeat(MANY))),
+    ]
+}
+
 /// Reads it, well or not; what is wrong with that.
 fn problem(format: Format, text: &str) -> Option<String> {
     let began = clock();
@@ -300,6 +329,8 @@ fn time_and_memory_grow_with_the_file_and_no_faster() {
         (Format::Vtp, vtp()),
         (Format::Vtu, vtu()),
         (Format::Msh, msh()),
+        (Format::Off, off()),
+        (Format::Medit, medit()),
     ];
     let all = formats.into_iter().flat_map(|(format, files)| files.into_iter().map(move |file| (format, file)));
     let problems = all.filter_map(|(format, (name, text))| {

@@ -146,14 +146,24 @@ fn survives(format: Format) {
 }
 
 /// Every format that is read.
-const FORMATS: [Format; 8] =
-    [Format::Stl, Format::Obj, Format::Gltf, Format::Ply, Format::Msh, Format::Vtk, Format::Vtu, Format::Vtp];
+const FORMATS: [Format; 10] = [
+    Format::Stl,
+    Format::Obj,
+    Format::Gltf,
+    Format::Ply,
+    Format::Msh,
+    Format::Vtk,
+    Format::Vtu,
+    Format::Vtp,
+    Format::Off,
+    Format::Medit,
+];
 
 #[test]
 fn readers_survive_files_that_are_nearly_right() {
     std::thread::scope(|threads| {
         let readers = FORMATS.map(|format| (format, threads.spawn(move || survives(format))));
         let broken = readers.map(|(format, reader)| reader.join().is_err().then_some(format));
-        assert_eq!(broken, [None; 8], "see above");
+        assert_eq!(broken, [None; 10], "see above");
     });
 }

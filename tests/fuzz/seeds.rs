@@ -20,6 +20,8 @@ pub fn of(format: Format) -> Vec<(String, Vec<u8>)> {
         Format::Gltf => gltf(),
         Format::Ply => vec![("strips.ply", STRIPS.into())],
         Format::Vtk => vec![("fields.vtk", FIELDS.into())],
+        Format::Off => vec![("colours.off", COLOURS.into()), ("bare.off", BARE.into())],
+        Format::Medit => vec![("sections.mesh", SECTIONS.into())],
         Format::Msh | Format::Vtu | Format::Vtp => vec![],
     };
     seeds.extend(own.into_iter().map(|(name, bytes)| (name.to_owned(), bytes)));
@@ -45,6 +47,17 @@ const FIELDS: &str = "# vtk DataFile Version 4.2\nfields\nASCII\nDATASET POLYDAT
                       1 1 0 0 1 0\n2 0 0\nVERTICES 1 2\n1 0\nLINES 1 3\n2 0 1\nPOLYGONS 2 9\n4 0 1 2 3\n3 1 4 2\n\
                       TRIANGLE_STRIPS 1 5\n4 0 1 3 2\nCELL_DATA 5\nSCALARS a float 1\nLOOKUP_TABLE default\n\
                       1 2 3 4 5\nPOINT_DATA 5\nNORMALS n float\n0 0 1 0 0 1 0 0 1 0 0 1 0 0 1\n";
+
+const COLOURS: &str = "STCNOFF # a comment\n6 5 0\n0 0 0 255 0 0 255 0 0 1 0 0\n1 0 0 1 1 1 1 0 0 1 1 0\n\
+                       1 1 nan\n0 1 1e-3\n# another\n0 2 0\n1 2 .5\n3 0 1 3 0.5 0.5 0.5\n4 0 1 5 4 7\n2 0 1\n\
+                       5 0 1 5 4 3 255 0 0\n3 3 5 4\n";
+
+const BARE: &str = "OFF4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
+
+const SECTIONS: &str = "MeshVersionFormatted 2\nDimension\n3\nTriangles\n2\n1 2 3 7\n1 3 4 7\nVertices\n7\n0 0 0 1\n\
+                        1 0 0 1\n1 1 0.5 1\n0 1 0 2\n.5 0 0 0\nnan 0 0 0\n0 .5 0 0\n# a comment\nCorners\n2\n1\n2\n\
+                        Quadrilaterals\n1\n1 2 3 4 0\nTrianglesP2\n1\n1 2 4 5 6 7 0\nEdges\n1\n1 2 0\nNormals\n1\n\
+                        0 0 1\nIdentifier \"a b\"\nTetrahedra\n1\n1 2 3 4 0\nEnd\n";
 
 /// Polygons that are not convex, and one of very many corners.
 fn polygons() -> Vec<u8> {

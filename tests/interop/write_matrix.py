@@ -198,6 +198,15 @@ def by_meshio(add):
             write(f"{kind}_41_{how}.msh", kind, "gmsh", binary=binary)
     write("mixed.obj", "mixed", "obj")
     write("triangles.off", "triangles", "off")
+    write("triangles.mesh", "triangles", "medit")
+    write("mixed.mesh", "mixed", "medit")
+    # What Gmsh neither writes nor reads: binary files of version 4.0. (meshio has no name for its writer of these.)
+    for kind in KINDS:
+        points, blocks = KINDS[kind]
+        mesh = meshio.Mesh(points, [(name_of, cells) for _, name_of, cells in blocks])
+        for binary in (False, True):
+            name = add(f"meshio_{kind}_40_{'binary' if binary else 'ascii'}.msh", kind)
+            meshio.gmsh._gmsh40.write(name, mesh, binary=binary)
     for kind in KINDS:
         write(f"{kind}_ascii.vtu", kind, "vtu", binary=False)
         for compression in (None, "zlib", "lzma"):
@@ -215,10 +224,13 @@ def by_gmsh(add):
         for binary in (0, 1):
             gmsh.option.setNumber("Mesh.Binary", binary)
             how = "binary" if binary else "ascii"
-            for version in (2.2, 4.1):
+            for version in (2.2, 4.1) if binary else (2.2, 4.0, 4.1):
                 gmsh.option.setNumber("Mesh.MshFileVersion", version)
                 gmsh.write(add(f"gmsh_{kind}_{version}_{how}.msh", kind))
             gmsh.write(add(f"gmsh_{kind}_{how}.vtk", kind))
+        gmsh.write(add(f"gmsh_{kind}.mesh", kind))
+        # Its OFF takes the corners of quadratic triangles, and writes all nodes.
+        gmsh.write(add(f"gmsh_{kind}.off", kind))
         if kind == "triangles":
             gmsh.write(add("gmsh.stl", kind))
     gmsh.finalize()

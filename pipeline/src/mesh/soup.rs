@@ -1,4 +1,7 @@
 //! A soup: triangles as a file gives them, with nothing promised but finite coordinates and indices in range.
+//!
+//! Files hold points that no triangle uses, and what such a point has for coordinates is no defect of the surface: it
+//! refuses nothing, and stands somewhere else instead, see [`TriangleSoup::new`].
 
 use crate::space::Vec3;
 
@@ -28,15 +31,25 @@ pub enum SoupError {
         /// How many points there were.
         points: usize,
     },
-    /// A coordinate is not a number, infinite, or too large to be squared.
-    #[error("coordinate {axis} of point {point} is {value}; every coordinate must be finite and below 1e100")]
+    /// Corners of triangles have coordinates that are no number, infinite, or too large to be squared.
+    #[error(
+        "{axis} of point {point} (from 0) is {value}, and triangle {triangle} has a corner there; in all {points} {} of this sort (no number, infinite, or above 1e100), in {triangles} {}; repair the exporting model, or delete these triangles",
+        if *points == 1 { "corner is" } else { "corners are" },
+        if *triangles == 1 { "triangle" } else { "triangles" }
+    )]
     NotFinite {
-        /// Position of the point in the file, from 0.
+        /// Position of the first of these points in the file, from 0.
         point: usize,
         /// `x`, `y` or `z`.
         axis: char,
         /// The value found.
         value: f64,
+        /// The first triangle with this corner, from 0.
+        triangle: usize,
+        /// How many such points are corners.
+        points: usize,
+        /// How many triangles have such corners.
+        triangles: usize,
     },
     /// A triangle names a point that does not exist.
     #[error("triangle {triangle} uses point {index}, but there are only {points} points")]
@@ -64,17 +77,15 @@ impl TriangleSoup {
     /// The largest number of triangles: half-edges and nodes of all of them must fit 32-bit ids.
     pub const MAX_TRIANGLES: usize = 300_000_000;
 
-    /// Checks that `points` and `triangles` are a soup.
+    /// Checks that `points` and `triangles` are a soup. Points that no triangle uses may have any coordinates: where these
+    /// are not finite or too large, the point is moved to a place where no other is.
     ///
     /// # Errors
     /// The first defect found, see [`SoupError`].
-    pub fn new(points: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self, SoupError> {
+    pub fn new(mut points: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self, SoupError> {
         let (count, limit) = (points.len(), Self::MAX_TRIANGLES);
         if triangles.len() > limit || count > 3 * limit {
             return Err(SoupError::TooLarge { triangles: triangles.len(), points: count, limit });
-        }
-        if let Some(point) = points.iter().position(|p| !p.iter().fold(true, |sound, c| sound & is_sound(*c))) {
-            return Err(not_finite(point, points[point]));
         }
         // One number is compared per triangle: the largest.
         if let Some(triangle) = triangles.iter().position(|[a, b, c]| *a.max(b).max(c) as usize >= count) {
@@ -84,7 +95,17 @@ impl TriangleSoup {
         if triangles.is_empty() {
             return Err(SoupError::NoTriangles { points: count });
         }
+        if !points.iter().all(Self::may_hold) {
+            refuse_corners(&points, &triangles)?;
+            move_unsound(&mut points);
+        }
         Ok(Self { points, triangles })
+    }
+
+    /// Whether a point may be the corner of a triangle: its coordinates are numbers that are not too large.
+    #[inline]
+    pub fn may_hold(point: &Vec3) -> bool {
+        point.iter().fold(true, |sound, c| sound & is_sound(*c))
     }
 
     /// The points, in the order of the file.
@@ -103,10 +124,41 @@ fn is_sound(c: f64) -> bool {
     c.abs() <= LARGEST
 }
 
-/// What is wrong with a point.
-fn not_finite(point: usize, p: Vec3) -> SoupError {
-    let at = p.iter().position(|c| !is_sound(*c)).unwrap_or_default();
-    SoupError::NotFinite { point, axis: ['x', 'y', 'z'][at], value: p[at] }
+/// Refuses triangles with unsound corners, and counts all of them.
+fn refuse_corners(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), SoupError> {
+    let is_unsound: Vec<bool> = points.iter().map(|p| !TriangleSoup::may_hold(p)).collect();
+    // Per point the first triangle that has it for a corner, if it is unsound.
+    let mut first: Vec<Option<u32>> = vec![None; points.len()];
+    let mut refused = 0;
+    for (triangle, corners) in (0..).zip(triangles) {
+        let unsound = corners.map(|corner| corner as usize).into_iter().filter(|corner| is_unsound[*corner]);
+        let mut is_refused = false;
+        for corner in unsound {
+            first[corner].get_or_insert(triangle);
+            is_refused = true;
+        }
+        refused += usize::from(is_refused);
+    }
+    let Some((point, triangle)) = first.iter().enumerate().find_map(|(i, t)| Some((i, (*t)?))) else { return Ok(()) };
+    let at = points[point].iter().position(|c| !is_sound(*c)).unwrap_or_default();
+    Err(SoupError::NotFinite {
+        point,
+        axis: ['x', 'y', 'z'][at],
+        value: points[point][at],
+        triangle: triangle as usize,
+        points: first.iter().flatten().count(),
+        triangles: refused,
+    })
+}
+
+/// Moves unsound points, none of which is a corner, each to a place of its own. Repair merges points that are equal: at the
+/// origin, or at a corner, they would be counted as merged, and not as points without triangles, which they are. None is
+/// left out, so that the others keep their numbers. Where they stand has no effect: what is measured of a surface
+/// (bounding box, cracks) is measured at corners.
+fn move_unsound(points: &mut [Vec3]) {
+    for (k, point) in points.iter_mut().filter(|p| !TriangleSoup::may_hold(p)).enumerate() {
+        *point = [LARGEST, LARGEST, k as f64];
+    }
 }
 
 #[cfg(test)]
@@ -129,9 +181,31 @@ mod tests {
         assert_eq!(TriangleSoup::new(points.clone(), broken), Err(error));
         for bad in [f64::NAN, f64::INFINITY, -1e101] {
             let mut broken = points.clone();
-            broken[3][1] = bad;
-            let found = TriangleSoup::new(broken, triangles.clone());
-            assert!(matches!(found, Err(SoupError::NotFinite { point: 3, axis: 'y', .. })), "{found:?}");
+            broken[2][1] = bad;
+            let found = TriangleSoup::new(broken.clone(), triangles.clone());
+            let counts = "triangle 0 has a corner there; in all 1 corner is of this sort (no number, infinite, or above 1e100), in 2 triangles;";
+            assert!(matches!(found, Err(SoupError::NotFinite { point: 2, axis: 'y', triangle: 0, .. })), "{found:?}");
+            assert!(found.is_err_and(|e| e.to_string().contains(counts)));
+            broken[3][0] = bad;
+            let found = TriangleSoup::new(broken, vec![[0, 1, 3], [0, 1, 3]]);
+            assert!(matches!(found, Err(SoupError::NotFinite { point: 3, points: 1, triangles: 2, .. })), "{found:?}");
+        }
+    }
+
+    /// They are counted, wherever the corners are, and the numbers of the others stay.
+    #[test]
+    fn points_that_no_triangle_uses_may_have_any_coordinates() {
+        for bad in [f64::NAN, f64::NEG_INFINITY, 1e300] {
+            let (mut points, mut triangles) = square();
+            points.insert(0, [bad; 3]);
+            points.extend([[0.0, bad, 0.0], [bad; 3]]);
+            triangles.iter_mut().flatten().for_each(|v| *v += 1);
+            let soup = TriangleSoup::new(points, triangles.clone()).expect("no corner is broken");
+            assert_eq!((soup.triangles(), soup.points()[1]), (&triangles[..], [0.0; 3]));
+            assert!(soup.points().len() == 7 && soup.points().iter().flatten().all(|c| c.is_finite()));
+            let repaired = crate::repair(&soup, &Default::default()).expect("a square");
+            assert_eq!((repaired.report.unreferenced_points, repaired.report.welded), (3, 0));
+            assert_eq!((repaired.mesh.points().len(), repaired.mesh.points()[0]), (4, [0.0; 3]));
         }
     }
 }

@@ -12,11 +12,11 @@ mod container;
 mod scene;
 mod tidy;
 
+use super::finish::{self, BadPoints};
 use super::{Content, Notes, ReadError, Source};
 use crate::outcome::Code;
 use buffers::Buffers;
 use gltf::json::Root;
-use pipeline::mesh::TriangleSoup;
 use scene::Scene;
 use tidy::Document;
 
@@ -136,7 +136,7 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     notes.units = Some("m".to_owned());
     scene.names.iter().for_each(|name| notes.name(name));
     scene.skipped.iter().for_each(|(kind, count)| notes.skip(kind, *count));
-    Ok(Content { soup: TriangleSoup::new(scene.points, scene.triangles)?, notes })
+    finish::content(scene.points, scene.triangles, notes, &BadPoints::default())
 }
 
 fn parse(json: &[u8]) -> Result<Root, GltfError> {

@@ -1,4 +1,4 @@
-//! MSH, the format of Gmsh: versions 2.0 to 2.2 and 4.1, ASCII and binary, in either order of bytes.
+//! MSH, the format of Gmsh: versions 2.0 to 2.2, 4.0 and 4.1, ASCII and binary, in either order of bytes.
 //!
 //! The triangles and quads of all entities together are the surface. Elements of higher order are taken by their
 //! corners: the nodes in the middle of edges and faces are left out and counted. Points, lines and elements of volumes
@@ -31,7 +31,7 @@ pub enum MshError {
     },
     /// A version that is not read.
     #[error(
-        "this is version {version} of MSH, and planish reads 2.0 to 2.2 and 4.1: convert the file with \"gmsh FILE -save -save_all -format msh41 -o NEW.msh\""
+        "this is version {version} of MSH, and planish reads 2.0 to 2.2, 4.0 and 4.1: convert the file with \"gmsh FILE -save -save_all -format msh41 -o NEW.msh\""
     )]
     Version {
         /// The version found.
@@ -136,16 +136,6 @@ pub enum MshError {
         /// Where it begins.
         place: Place,
     },
-    /// A coordinate is not a number, or infinite.
-    #[error("{place}: node {node} has the coordinate {value}; repair the exporting model")]
-    NotFinite {
-        /// The tag of the node.
-        node: u64,
-        /// The value.
-        value: String,
-        /// Where.
-        place: Place,
-    },
     /// Two nodes have the same tag.
     #[error("there are two nodes {node}; renumber the mesh, or save it again with Gmsh")]
     SameNode {
@@ -180,7 +170,6 @@ impl MshError {
             Self::Count { .. } | Self::Sum { .. } | Self::Truncated { .. } => Code::CountMismatch,
             Self::Short { .. } | Self::NoEnd { .. } => Code::CountMismatch,
             Self::TooMany(_) => Code::TooLarge,
-            Self::NotFinite { .. } => Code::NotFinite,
             Self::Version { .. } => Code::UnsupportedFormat,
             _ => Code::Malformed,
         }
@@ -199,7 +188,6 @@ impl MshError {
             | Self::Value { place, .. }
             | Self::NoEnd { place, .. }
             | Self::SecondSection { place, .. }
-            | Self::NotFinite { place, .. }
             | Self::NoType { place, .. }
             | Self::NoNode { place, .. } => Some(place.to_string()),
         }
@@ -210,18 +198,21 @@ impl MshError {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Version {
     Two,
+    /// 4.0, in which tags are ints.
+    FourZero,
     Four,
 }
 
 /// Reads an MSH file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
-    let (surface, mut notes) = surface(source, false)?;
-    Ok(Content { soup: surface.finish(&mut notes)?, notes })
+    let (surface, notes) = surface(source, false)?;
+    surface.finish(notes)
 }
 
 /// Reads an MSH file with the entities of its triangles, and the nodes in the middle of their sides.
 pub(super) fn read_patches(source: &Source) -> Result<Patches, ReadError> {
-    Ok(surface(source, true)?.0.finish_patches()?)
+    let (surface, notes) = surface(source, true)?;
+    surface.finish_patches(notes)
 }
 
 /// Reads the triangles of an MSH file.
@@ -266,6 +257,7 @@ fn format_error(line: usize, problem: String) -> MshError {
 fn version(name: &[u8], line: usize) -> Result<Version, MshError> {
     match float(name) {
         Some(number) if (2.0..=2.2).contains(&number) => Ok(Version::Two),
+        Some(4.0) => Ok(Version::FourZero),
         Some(4.1) => Ok(Version::Four),
         _ => Err(MshError::Version { version: shown(name), line }),
     }
@@ -332,7 +324,8 @@ impl<'n> Found<'n> {
             (b"Nodes" | b"ParametricNodes", _) if self.nodes.is_some() || self.surface.is_some() => {
                 return Err(second(name, values));
             }
-            (b"Nodes", Version::Four) => self.nodes = Some(sections::nodes_4(values, limits)?),
+            (b"Nodes", Version::Four) => self.nodes = Some(sections::nodes_4_1(values, limits)?),
+            (b"Nodes", Version::FourZero) => self.nodes = Some(sections::nodes_4_0(values, limits)?),
             (b"Nodes", Version::Two) => self.nodes = Some(sections::nodes_2(values, false, limits)?),
             (b"ParametricNodes", Version::Two) => self.nodes = Some(sections::nodes_2(values, true, limits)?),
             (b"Elements", _) if self.surface.is_some() => return Err(second(name, values)),
@@ -341,7 +334,8 @@ impl<'n> Found<'n> {
                 let surface = self.surface.insert(Surface::new(nodes, limits, self.keep));
                 match version {
                     Version::Two => sections::elements_2(values, surface)?,
-                    Version::Four => sections::elements_4(values, surface)?,
+                    Version::FourZero => sections::elements_4_0(values, surface)?,
+                    Version::Four => sections::elements_4_1(values, surface)?,
                 }
             }
             (b"PhysicalNames", _) => {

@@ -2,6 +2,7 @@
 
 use super::MshError;
 use super::sparse::Sparse;
+use crate::formats::finish::BadPoints;
 use pipeline::space::Vec3;
 
 /// A table by tag may have so many places per node.
@@ -11,6 +12,7 @@ const PLACES: u64 = 4;
 #[derive(Debug)]
 pub struct Nodes {
     pub points: Vec<Vec3>,
+    pub bad: BadPoints,
     numbering: Numbering,
 }
 
@@ -30,8 +32,8 @@ pub const NONE: u32 = u32::MAX;
 
 impl Nodes {
     /// Nodes, each with its tag.
-    pub fn new(points: Vec<Vec3>, tags: Vec<u64>) -> Result<Self, MshError> {
-        Ok(Self { points, numbering: Numbering::new(tags)? })
+    pub fn new(points: Vec<Vec3>, tags: Vec<u64>, bad: BadPoints) -> Result<Self, MshError> {
+        Ok(Self { points, bad, numbering: Numbering::new(tags)? })
     }
 
     /// The position of the node with this tag.
@@ -103,7 +105,7 @@ mod tests {
         ];
         for tags in rows {
             let points = vec![[0.0; 3]; tags.len()];
-            let nodes = Nodes::new(points, tags.to_vec()).expect("distinct tags");
+            let nodes = Nodes::new(points, tags.to_vec(), BadPoints::default()).expect("distinct tags");
             for tag in [0, 1, 2, 3, 5, 6, 7, 8, 9, 10, 1 << 40, u64::MAX - 1, u64::MAX] {
                 let expected = tags.iter().position(|t| *t == tag).map(|at| at as u32);
                 assert_eq!(nodes.find(tag), expected, "{tag} among {tags:?}");
@@ -117,7 +119,7 @@ mod tests {
     #[test]
     fn equal_tags_are_refused() {
         for tags in [[1, 2, 2], [5, 5, 5], [1, u64::MAX, 1]] {
-            let twice = Nodes::new(vec![[0.0; 3]; 3], tags.to_vec()).map(|nodes| nodes.points);
+            let twice = Nodes::new(vec![[0.0; 3]; 3], tags.to_vec(), BadPoints::default()).map(|nodes| nodes.points);
             assert!(matches!(twice, Err(MshError::SameNode { .. })), "{tags:?}");
         }
     }

@@ -1,4 +1,4 @@
-//! The sections of nodes and elements, of MSH 2 and MSH 4.1.
+//! The sections of nodes and elements, of MSH 2, MSH 4.0 and MSH 4.1.
 
 use super::MshError;
 use super::nodes::Nodes;
@@ -6,6 +6,7 @@ use super::plain::Layout;
 use super::shapes::{Kind, Shape};
 use super::surface::Surface;
 use super::values::{Fault, Values, number};
+use crate::formats::finish::BadPoints;
 use crate::formats::{Limits, TooMany};
 use pipeline::space::Vec3;
 
@@ -22,24 +23,27 @@ fn fits<'a, V: Values<'a>>(values: &V, what: &'static str, count: u64, bytes: u6
 struct Growing {
     points: Vec<Vec3>,
     tags: Vec<u64>,
+    bad: BadPoints,
 }
 
 impl Growing {
     /// Room for so many, which were checked.
     fn new(count: u64) -> Self {
         let count = usize::try_from(count).unwrap_or(0);
-        Self { points: Vec::with_capacity(count), tags: Vec::with_capacity(count) }
+        Self { points: Vec::with_capacity(count), tags: Vec::with_capacity(count), bad: BadPoints::default() }
     }
 
     /// Reads the coordinates of a node.
-    fn point<'a, V: Values<'a>>(&mut self, values: &mut V, node: u64) -> Result<(), Fault> {
+    fn point<'a, V: Values<'a>>(&mut self, values: &mut V) -> Result<(), Fault> {
         let begin = values.place();
         let point = [values.double()?, values.double()?, values.double()?];
-        if let Some(value) = point.iter().find(|c| !c.is_finite()) {
-            return Err(MshError::NotFinite { node, value: value.to_string(), place: values.place_since(begin) }.into());
-        }
+        self.bad.check(self.points.len(), &point, || values.place_since(begin));
         self.points.push(point);
         Ok(())
+    }
+
+    fn finish(self) -> Result<Nodes, Fault> {
+        Ok(Nodes::new(self.points, self.tags, self.bad)?)
     }
 }
 
@@ -59,9 +63,8 @@ pub fn nodes_2<'a, V: Values<'a>>(values: &mut V, parametric: bool, limits: &Lim
     fits(values, "nodes", count, V::INT + 3 * V::DOUBLE, limits.elements)?;
     let mut nodes = Growing::new(count);
     for _ in 0..count {
-        let tag = values.natural()?;
-        nodes.tags.push(tag);
-        nodes.point(values, tag)?;
+        nodes.tags.push(values.natural()?);
+        nodes.point(values)?;
         if parametric {
             let dimension = values.int()?;
             values.skip(1, V::INT)?;
@@ -70,11 +73,11 @@ pub fn nodes_2<'a, V: Values<'a>>(values: &mut V, parametric: bool, limits: &Lim
             values.skip(numbers, V::DOUBLE)?;
         }
     }
-    Ok(Nodes::new(nodes.points, nodes.tags)?)
+    nodes.finish()
 }
 
 /// `$Nodes` of MSH 4.1.
-pub fn nodes_4<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nodes, Fault> {
+pub fn nodes_4_1<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nodes, Fault> {
     values.end_line();
     let (blocks, count) = (values.size()?, values.size()?);
     values.skip(2, V::SIZE)?;
@@ -89,13 +92,34 @@ pub fn nodes_4<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nod
         for _ in 0..block {
             nodes.tags.push(values.size()?);
         }
-        for i in first..nodes.tags.len() {
-            nodes.point(values, nodes.tags[i])?;
+        for _ in first..nodes.tags.len() {
+            nodes.point(values)?;
             values.skip(numbers, V::DOUBLE)?;
         }
     }
     all(values, "nodes", nodes.tags.len() as u64, count)?;
-    Ok(Nodes::new(nodes.points, nodes.tags)?)
+    nodes.finish()
+}
+
+/// `$Nodes` of MSH 4.0: the tag of each node stands before its coordinates, and there are no parameters in volumes.
+pub fn nodes_4_0<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nodes, Fault> {
+    values.end_line();
+    let (blocks, count) = (values.size()?, values.size()?);
+    fits(values, "nodes", count, V::INT + 3 * V::DOUBLE, limits.elements)?;
+    let mut nodes = Growing::new(count);
+    for _ in 0..blocks {
+        let (_, dimension, parametric) = (values.int()?, values.int()?, values.int()?);
+        let numbers = if parametric == 0 { 0 } else { parameters(dimension)? % 3 };
+        let block = values.size()?;
+        within(values, "nodes", block, count - nodes.tags.len() as u64, count)?;
+        for _ in 0..block {
+            nodes.tags.push(values.natural()?);
+            nodes.point(values)?;
+            values.skip(numbers, V::DOUBLE)?;
+        }
+    }
+    all(values, "nodes", nodes.tags.len() as u64, count)?;
+    nodes.finish()
 }
 
 /// Checks that a block has no more records than are left of those declared for all.
@@ -181,11 +205,31 @@ fn blocks_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64
 }
 
 /// `$Elements` of MSH 4.1.
-pub fn elements_4<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), Fault> {
+pub fn elements_4_1<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), Fault> {
     values.end_line();
     let (blocks, count) = (values.size()?, values.size()?);
     values.skip(2, V::SIZE)?;
-    fits(values, "elements", count, 2 * V::SIZE, surface.limits.elements)?;
+    elements_4(values, surface, [blocks, count], (V::SIZE, V::size))
+}
+
+/// `$Elements` of MSH 4.0: without the least and the largest tag.
+pub fn elements_4_0<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), Fault> {
+    values.end_line();
+    let (blocks, count) = (values.size()?, values.size()?);
+    elements_4(values, surface, [blocks, count], (V::INT, V::natural))
+}
+
+/// The bytes of a tag, and what reads one.
+type Tag<V> = (u64, fn(&mut V) -> Result<u64, Fault>);
+
+/// Elements of MSH 4, in blocks.
+fn elements_4<'a, V: Values<'a>>(
+    values: &mut V,
+    surface: &mut Surface,
+    [blocks, count]: [u64; 2],
+    (size, tag): Tag<V>,
+) -> Result<(), Fault> {
+    fits(values, "elements", count, 2 * size, surface.limits.elements)?;
     let mut left = count;
     for _ in 0..blocks {
         values.skip(1, V::INT)?;
@@ -196,14 +240,14 @@ pub fn elements_4<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> R
         left -= block;
         if let Kind::Other(kind) = shape.kind {
             surface.skip(kind, block);
-            skip_records(values, block, 1 + shape.nodes as u64, V::SIZE)?;
+            skip_records(values, block, 1 + shape.nodes as u64, size)?;
             continue;
         }
-        let layout = Layout { shape, before: 1, size: V::SIZE };
+        let layout = Layout { shape, before: 1, size };
         let plain = values.binary().map_or(0, |binary| surface.plain(binary, layout, block));
         for _ in plain..block {
-            let element = values.size()?;
-            surface.element(values, shape, element, V::size)?;
+            let element = tag(values)?;
+            surface.element(values, shape, element, tag)?;
         }
     }
     all(values, "elements", count - left, count)?;

@@ -4,9 +4,9 @@ use super::MshError;
 use super::nodes::Nodes;
 use super::shapes::{Kind, Shape};
 use super::values::{Fault, Values};
+use crate::formats::finish;
 use crate::formats::place::Place;
-use crate::formats::{Limits, Notes, Patches, TooMany, polygon};
-use pipeline::mesh::{SoupError, TriangleSoup};
+use crate::formats::{Content, Limits, Notes, Patches, ReadError, TooMany, polygon};
 use std::collections::BTreeMap;
 
 /// Nodes, and the triangles so far.
@@ -112,20 +112,26 @@ impl<'n> Surface<'n> {
     }
 
     /// All triangles with all that was kept of them, and all nodes.
-    pub fn finish_patches(self) -> Result<Patches, SoupError> {
-        let Self { nodes, triangles, kept, .. } = self;
+    pub fn finish_patches(self, mut notes: Notes) -> Result<Patches, ReadError> {
+        let Self { nodes, mut triangles, kept, .. } = self;
         let Kept { mids, entities } = kept.unwrap_or_default();
-        Patches::new(nodes.points, triangles, mids, Some(entities))
+        for (kind, count) in self.skipped {
+            notes.skip(kind, usize::try_from(count).unwrap_or(usize::MAX));
+        }
+        // Nodes in the middle of sides must be points that can be, as corners must.
+        triangles.extend(mids.iter().flatten());
+        let Content { soup, .. } = finish::content(nodes.points, triangles, notes, &nodes.bad)?;
+        Ok(Patches::new(&soup, mids, Some(entities)))
     }
 
     /// All triangles, and the nodes without those that lie in the middle of edges and faces only.
-    pub fn finish(self, notes: &mut Notes) -> Result<TriangleSoup, SoupError> {
+    pub fn finish(self, mut notes: Notes) -> Result<Content, ReadError> {
         let Self { nodes, mut mids, mut triangles, .. } = self;
         for (kind, count) in self.skipped {
             notes.skip(kind, usize::try_from(count).unwrap_or(usize::MAX));
         }
         [notes.polygons, notes.polygons_doubtful] = self.polygons;
-        let mut points = nodes.points;
+        let Nodes { mut points, mut bad, .. } = nodes;
         if !mids.is_empty() {
             // What is a corner anywhere stays.
             triangles.iter().flatten().for_each(|corner| mids[*corner as usize] = false);
@@ -140,7 +146,8 @@ impl<'n> Surface<'n> {
             let mut left_out = mids.iter();
             points.retain(|_| left_out.next() != Some(&true));
             triangles.iter_mut().for_each(|t| *t = t.map(|node| numbers[node as usize]));
+            bad.0.retain_mut(|(node, _)| !mids[std::mem::replace(node, numbers[*node] as usize)]);
         }
-        TriangleSoup::new(points, triangles)
+        finish::content(points, triangles, notes, &bad)
     }
 }

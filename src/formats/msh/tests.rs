@@ -82,7 +82,9 @@ impl Mesh {
         }
         file.text("$EndMeshFormat\n");
         file.text(self.more);
-        if version.starts_with('4') {
+        if ["4", "4.0"].contains(&version) {
+            self.sections_4_0(&mut file)
+        } else if version.starts_with('4') {
             self.sections_4(&mut file)
         } else {
             self.sections_2(&mut file)
@@ -157,15 +159,49 @@ impl Mesh {
         }
         file.text("\n$EndElements");
     }
+
+    /// Tags are ints, each before the coordinates of its node.
+    fn sections_4_0(&self, file: &mut File) {
+        file.text("$Nodes\n");
+        [2, self.nodes.len() as u64].into_iter().for_each(|i| file.size(i));
+        let (first, second) = self.nodes.split_at(self.nodes.len().min(1));
+        for block in [first, second] {
+            file.line();
+            let dimension = self.parametric.unwrap_or(2);
+            [5, dimension, i64::from(self.parametric.is_some())].into_iter().for_each(|i| file.int(i));
+            file.size(block.len() as u64);
+            for (tag, point) in block {
+                file.line();
+                file.int(*tag as i64);
+                file.point(*point, self.parametric.unwrap_or(0) % 3);
+            }
+        }
+        file.text("\n$EndNodes\n$Elements\n");
+        [self.blocks.len() as u64, self.elements() as u64].into_iter().for_each(|i| file.size(i));
+        for (number, elements) in &self.blocks {
+            file.line();
+            [5, 2, *number].into_iter().for_each(|i| file.int(i));
+            file.size(elements.len() as u64);
+            for (nodes, tag) in elements.iter().zip(101..) {
+                file.line();
+                file.int(tag);
+                nodes.iter().for_each(|n| file.int(*n as i64));
+            }
+        }
+        file.text("\n$EndElements");
+    }
 }
 
-const ALL: [(&str, Encoding); 9] = [
+const ALL: [(&str, Encoding); 12] = [
     ("2", Ascii),
     ("2.0", Big),
     ("2.1", Ascii),
     ("2.2", Ascii),
     ("2.2", Little),
     ("2.2", Big),
+    ("4", Ascii),
+    ("4.0", Little),
+    ("4.0", Big),
     ("4.1", Ascii),
     ("4.1", Little),
     ("4.1", Big),
@@ -180,7 +216,7 @@ fn in_all_encodings(mesh: &Mesh) -> Content {
         let notes = Notes { format: contents[0].notes.format.clone(), ..content.notes.clone() };
         assert_eq!((&content.soup, &notes), (&contents[0].soup, &contents[0].notes), "{how:?}");
     }
-    contents.into_iter().next().expect("nine")
+    contents.into_iter().next().expect("some")
 }
 
 /// Two triangles of a square.
@@ -239,6 +275,62 @@ fn quads_and_elements_of_higher_order_are_taken_by_their_corners() {
     assert_eq!(found.soup.triangles().len(), 7);
 }
 
+/// Unused ones, and nodes in the middle of edges; those of corners are told by their line, though nodes before are left out.
+#[test]
+fn coordinates_that_are_none_refuse_the_elements_that_have_them_at_corners_only() {
+    let mut mesh = square();
+    mesh.nodes.splice(0..0, [(11, [f64::NAN; 3]), (12, [f64::INFINITY; 3]), (13, [-1e300; 3])]);
+    mesh.nodes.push((99, [f64::NAN; 3]));
+    mesh.blocks = vec![(9, vec![vec![1, 2, 3, 11, 12, 13]]), (2, vec![vec![1, 3, 4]])];
+    for (version, encoding) in ALL {
+        let found = content(&mesh.file(version, encoding)).unwrap_or_else(|e| panic!("{version} {encoding:?}: {e}"));
+        assert_eq!((found.soup.triangles(), found.soup.points().len()), (&[[0, 1, 2], [0, 2, 3]][..], 5));
+        assert_eq!(found.soup.points()[..4], *in_all_encodings(&square()).soup.points());
+    }
+    mesh.nodes[4].1[1] = f64::NAN;
+    let reason = content(&mesh.file("2.2", Ascii)).expect_err("a corner").reason();
+    assert_eq!((reason.code, reason.place.as_deref()), (Code::NotFinite, Some("line 10")), "{reason:?}");
+    assert!(reason.message.contains("1 corner is of this sort"), "{reason:?}");
+}
+
+#[test]
+fn volumes_alone_are_refused_with_their_counts() {
+    let mesh = Mesh { blocks: vec![(1, vec![vec![1, 2]]), (11, vec![vec![1; 10]; 11_000])], ..square() };
+    for (version, encoding) in ALL {
+        let error = content(&mesh.file(version, encoding)).expect_err("no surface");
+        assert_eq!(error.notes().map(|notes| notes.skipped["tetrahedron"]), Some(11_000));
+        let reason = error.reason();
+        assert!(reason.code == Code::NoTriangles && reason.message.contains("only 1 line, 11,000 tetrahedra; their"));
+    }
+}
+
+/// As PyMesh and fTetWild write: no line ends before the end of a section.
+#[test]
+fn binary_sections_may_end_without_a_line_break() {
+    for version in ["2.2", "4.0", "4.1"] {
+        let data = |end: &str| {
+            let mut file = square().file(version, Little);
+            for _ in 0..2 {
+                file.extend(b"\n$NodeData\n1\n\"a\"\n1\n0.0\n3\n0\n1\n1\n");
+                file.extend([[1, 0, 0, 0], *b"$End", [0; 4]].concat());
+                file.extend(end.as_bytes());
+            }
+            file
+        };
+        let whole = data("$EndNodeData\n");
+        let bare: Vec<u8> = ["\n$EndNodes", "\n$EndElements", "\n$EndMeshFormat"]
+            .iter()
+            .fold(whole, |file, end| replaced(&file, end.as_bytes(), end.trim_start().as_bytes()));
+        assert_eq!(content(&bare).map(|c| c.soup), Ok(in_all_encodings(&square()).soup), "{version}");
+        assert!(matches!(error(&data("$EndNodeDat\n")), MshError::Truncated { .. }), "{version}");
+    }
+}
+
+fn replaced(file: &[u8], old: &[u8], new: &[u8]) -> Vec<u8> {
+    let at = file.windows(old.len()).position(|w| w == old).expect("it is there");
+    [&file[..at], new, &file[at + old.len()..]].concat()
+}
+
 #[test]
 fn other_elements_are_counted_by_kind() {
     let mut mesh = square();
@@ -289,12 +381,12 @@ fn comments_may_come_first_and_versions_are_numbers() {
     }
     assert!(matches!(error(b"$Comments\n1 2\n"), MshError::Truncated { .. }));
     let text = String::from_utf8(file(Ascii)).expect("text");
-    let late = error(format!("$Comments\n\n$EndComments\n{}", text.replace("2.2", "4.0")).as_bytes());
+    let late = error(format!("$Comments\n\n$EndComments\n{}", text.replace("2.2", "3.0")).as_bytes());
     assert_eq!(late.place().as_deref(), Some("line 5"));
     for version in ["2", "2.10", "2.1999999999999997"] {
         assert!(content(text.replace("2.2", version).as_bytes()).is_ok(), "{version}");
     }
-    for version in ["2.3", "3", "4", "4.10001", "nan", "x"] {
+    for version in ["2.3", "3", "4.01", "4.10001", "nan", "x"] {
         assert!(matches!(error(text.replace("2.2", version).as_bytes()), MshError::Version { .. }), "{version}");
     }
 }
@@ -307,7 +399,7 @@ fn broken_files_are_refused_with_code_and_place() {
     let rows = [
         (two.replace("$Mesh", "Mesh"), Code::Malformed, Some("line 1"), "no MSH"),
         (two.replace("2.2", "1"), Code::UnsupportedFormat, Some("line 2"), "-format msh41"),
-        (two.replace("2.2", "4.0"), Code::UnsupportedFormat, Some("line 2"), "4.0"),
+        (two.replace("2.2", "4.2"), Code::UnsupportedFormat, Some("line 2"), "4.2"),
         ("$NOD\n1\n1 0 0 0\n".to_owned(), Code::UnsupportedFormat, Some("line 1"), "version 1"),
         (two.replace("0 8", "2 8"), Code::Malformed, Some("line 2"), "neither 0"),
         (two.replace("0 8", "0 4"), Code::Malformed, Some("line 2"), "4 bytes"),
@@ -320,6 +412,8 @@ fn broken_files_are_refused_with_code_and_place() {
         (two.replace("2 1 0 0", "1 1 0 0"), Code::Malformed, Some("node 1"), "two nodes 1"),
         (two.replace("2 1 0 0", "-2 1 0 0"), Code::Malformed, Some("line 7"), "-2 is negative"),
         (two.replace("2 1 0 0", "2 1 nan 0"), Code::NotFinite, Some("line 7"), "NaN"),
+        (two.replace("2 1 0 0", "2 1 0,5 0"), Code::Malformed, Some("line 7"), "decimal comma"),
+        (four.replace("4 1 0 0", "4 1.0D+00 0 0"), Code::Malformed, Some("line 9"), "Fortran exponent"),
         (two.replace("2 1 0 0", "2 1 x 0"), Code::Malformed, Some("line 7"), "\"x\" is no number"),
         (two.replace("8 9 1 3 4", "8 9 1 3 5"), Code::Malformed, Some("line 15"), "element 102 names node 5"),
         (two.replace("102 2 2", "102 34 2"), Code::Malformed, Some("line 15"), "34 is no type"),
@@ -344,7 +438,7 @@ fn broken_files_are_refused_with_code_and_place() {
     }
     let cloud = Mesh { blocks: Vec::new(), ..square() };
     let found = content(&cloud.file("4.1", Little));
-    assert!(matches!(found, Err(ReadError::Soup(SoupError::NoTriangles { points: 4 }))), "{found:?}");
+    assert!(matches!(found, Err(ReadError::Soup { error: SoupError::NoTriangles { points: 4 }, .. })), "{found:?}");
 }
 
 #[test]
@@ -360,8 +454,10 @@ fn broken_binary_files_are_refused_with_their_byte() {
     let many = with(nodes + 8, &u64::MAX.to_be_bytes());
     assert!(matches!(many, MshError::Count { what: "nodes", count: u64::MAX, needed: u64::MAX, .. }), "{many:?}");
     let point = nodes + 32 + 20 + 8;
-    let nan = with(point, &f64::NAN.to_be_bytes());
-    assert_eq!(nan, MshError::NotFinite { node: 1, value: "NaN".into(), place: Place::Byte(point) });
+    let mut nan = file.clone();
+    nan[point..point + 8].copy_from_slice(&f64::NAN.to_be_bytes());
+    let nan = content(&nan).expect_err("a corner").reason();
+    assert_eq!((nan.code, nan.place), (Code::NotFinite, Some(format!("byte {point}"))), "{}", nan.message);
     let elements = at(b"$Elements\n") + 10;
     let block = with(elements + 32 + 12, &(1u64 << 63).to_be_bytes());
     assert!(matches!(block, MshError::Sum { what: "elements", count: 2, .. }), "{block:?}");

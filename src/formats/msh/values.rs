@@ -2,7 +2,7 @@
 
 use super::MshError;
 use crate::formats::place::{Place, shown};
-use crate::formats::words::{Words, float};
+use crate::formats::words::{Words, float, remedy};
 
 /// What is wrong in a section.
 #[derive(Debug, PartialEq, Eq)]
@@ -85,14 +85,17 @@ fn no_number(word: &[u8]) -> Fault {
     if word.starts_with(b"$") {
         return Fault::Short;
     }
-    Fault::Value(format!("\"{}\" is no number that can stand here", shown(word)))
+    Fault::Value(format!("\"{}\" is no number that can stand here{}", shown(word), remedy(word)))
 }
 
-/// Where the line that ends a section begins, and where its name ends.
-fn end_of(rest: &[u8], section: &[u8]) -> Option<(usize, usize)> {
+/// Where the word that ends a section begins, and where it ends. Some writers of binary files (PyMesh, fTetWild) end no line
+/// before it: then it may follow any byte.
+fn end_of(rest: &[u8], section: &[u8], is_binary: bool) -> Option<(usize, usize)> {
     let name = [b"$End", section].concat();
     let blank = |at: usize| rest.get(at).is_none_or(u8::is_ascii_whitespace);
-    let stands = |at: &usize| rest[*at..].starts_with(&name) && (*at == 0 || blank(at - 1)) && blank(at + name.len());
+    let stands = |at: &usize| {
+        rest[*at..].starts_with(&name) && (is_binary || *at == 0 || blank(at - 1)) && blank(at + name.len())
+    };
     let at = (0..rest.len()).filter(|at| rest[*at] == b'$').find(stands)?;
     Some((at, at + name.len()))
 }
@@ -125,7 +128,7 @@ impl<'a> Values<'a> for Text<'a> {
 
     fn until_end(&mut self, section: &[u8]) -> Option<&'a [u8]> {
         let rest = self.0.rest();
-        let (at, end) = end_of(rest, section)?;
+        let (at, end) = end_of(rest, section, false)?;
         self.0.advance(end);
         Some(&rest[..at])
     }
@@ -208,7 +211,7 @@ impl<'a> Values<'a> for Binary<'a> {
 
     fn until_end(&mut self, section: &[u8]) -> Option<&'a [u8]> {
         let rest = self.rest();
-        let (at, end) = end_of(rest, section)?;
+        let (at, end) = end_of(rest, section, true)?;
         self.at += end;
         Some(&rest[..at])
     }

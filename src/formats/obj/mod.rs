@@ -8,25 +8,17 @@
 
 mod statements;
 
-use super::place::shown;
-use super::words::{float, integer};
+use super::finish::{self, BadPoints};
+use super::place::{Place, shown};
+use super::words::{float, foreign_number, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
-use pipeline::mesh::TriangleSoup;
 use pipeline::space::Vec3;
-use statements::{Kind, Plain, Statement, Statements};
+use statements::{Kind, Plain, Statement, Statements, as_shown};
 
 /// Why bytes are no OBJ file.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ObjError {
-    /// A coordinate is not a number, or infinite.
-    #[error("line {line} has the coordinate {value}; repair the exporting model")]
-    NotFinite {
-        /// The line, from 1.
-        line: usize,
-        /// The word found.
-        value: String,
-    },
     /// A face names a vertex that does not exist.
     #[error(
         "line {line}: a face uses vertex {index}, but the file has {vertices}; the file was cut off or its numbering is wrong: export it again"
@@ -47,6 +39,14 @@ pub enum ObjError {
         /// The line's text, shortened.
         text: String,
     },
+    /// A coordinate is written in another way.
+    #[error("line {line}: {problem}")]
+    Number {
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
     /// There are more than may be.
     #[error(transparent)]
     TooMany(#[from] TooMany),
@@ -61,15 +61,14 @@ pub enum ObjError {
 impl ObjError {
     pub(super) fn code(&self) -> Code {
         match self {
-            Self::NotFinite { .. } => Code::NotFinite,
             Self::TooMany(_) => Code::TooLarge,
-            Self::OutOfRange { .. } | Self::Syntax { .. } | Self::Library { .. } => Code::Malformed,
+            _ => Code::Malformed,
         }
     }
 
     pub(super) fn place(&self) -> Option<String> {
         match self {
-            Self::NotFinite { line, .. } | Self::OutOfRange { line, .. } | Self::Syntax { line, .. } => {
+            Self::Number { line, .. } | Self::OutOfRange { line, .. } | Self::Syntax { line, .. } => {
                 Some(format!("line {line}"))
             }
             Self::TooMany(_) | Self::Library { .. } => None,
@@ -82,7 +81,11 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let statements = Statements::new(source.bytes);
     let geometry = check(&statements, source.limits)?;
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let loaded = tobj::load_obj_buf(&mut Plain::new(statements), &tobj::LoadOptions::default(), no_materials);
+    let loaded = tobj::load_obj_buf(
+        &mut Plain::new(statements, !geometry.bad.0.is_empty()),
+        &tobj::LoadOptions::default(),
+        no_materials,
+    );
     let (models, _) = loaded.map_err(|e| ObjError::Library { problem: e.to_string() })?;
     let mut notes = Notes::new("OBJ");
     names(source.bytes).for_each(|name| notes.name(&String::from_utf8_lossy(name)));
@@ -91,7 +94,7 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
         geometry.agrees_with(&mesh.positions)?;
         geometry.cut(&mesh, &mut triangles, &mut notes);
     }
-    Ok(Content { soup: TriangleSoup::new(geometry.points, triangles)?, notes })
+    finish::content(geometry.points, triangles, notes, &geometry.bad)
 }
 
 /// The names of objects and groups.
@@ -106,6 +109,7 @@ fn names(file: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// The vertices of a file in its own order, and in the order in which faces first use them, which is the library's.
 struct Geometry {
     points: Vec<Vec3>,
+    bad: BadPoints,
     first_used: Vec<u32>,
     /// How many triangles the faces give.
     triangles: usize,
@@ -113,9 +117,9 @@ struct Geometry {
 
 impl Geometry {
     /// The library must have found the same vertices in that order: then its indices can be turned back into those
-    /// of the file.
+    /// of the file. (It is not shown coordinates that can be no corner's.)
     fn agrees_with(&self, positions: &[f64]) -> Result<(), ObjError> {
-        let expected = self.first_used.iter().flat_map(|v| self.points[*v as usize]);
+        let expected = self.first_used.iter().flat_map(|v| self.points[*v as usize].map(as_shown));
         if positions.iter().copied().eq(expected) {
             return Ok(());
         }
@@ -170,11 +174,16 @@ impl Geometry {
 fn check(statements: &Statements, limits: &Limits) -> Result<Geometry, ObjError> {
     let vertices = statements.clone().filter(|s| s.kind == Kind::Vertex).count();
     TooMany::check("vertices", vertices as u64, limits.elements)?;
-    let mut geometry = Geometry { points: Vec::with_capacity(vertices), first_used: Vec::new(), triangles: 0 };
+    let (points, bad) = (Vec::with_capacity(vertices), BadPoints::default());
+    let mut geometry = Geometry { points, bad, first_used: Vec::new(), triangles: 0 };
     let mut used = vec![false; vertices];
     for statement in statements.clone() {
         match statement.kind {
-            Kind::Vertex => geometry.points.push(point(&statement)?),
+            Kind::Vertex => {
+                let point = point(&statement)?;
+                geometry.bad.check(geometry.points.len(), &point, || Place::Line(statement.line));
+                geometry.points.push(point);
+            }
             Kind::Face => {
                 geometry.face(&statement, &mut used)?;
                 TooMany::check("triangles", geometry.triangles as u64, limits.elements)?;
@@ -195,10 +204,10 @@ fn point(statement: &Statement) -> Result<Vec3, ObjError> {
     let (mut point, mut numbers) = ([0.0; 3], statement.numbers());
     for c in &mut point {
         let word = numbers.next().ok_or_else(|| syntax(statement))?;
-        *c = float(word).ok_or_else(|| syntax(statement))?;
-        if !c.is_finite() {
-            return Err(ObjError::NotFinite { line: statement.line, value: shown(word) });
-        }
+        *c = float(word).ok_or_else(|| match foreign_number(word) {
+            Some(_) => ObjError::Number { line: statement.line, problem: no_number(word) },
+            None => syntax(statement),
+        })?;
     }
     Ok(point)
 }
@@ -208,7 +217,7 @@ mod tests {
     use super::*;
 
     use crate::formats::Nothing;
-    use pipeline::mesh::SoupError;
+    use pipeline::mesh::{SoupError, TriangleSoup};
 
     fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
         limited(bytes, &Limits::default())
@@ -289,12 +298,27 @@ mod tests {
     }
 
     #[test]
+    fn coordinates_that_are_none_refuse_the_faces_that_use_them_only() {
+        for bad in ["nan", "-inf", "1e999", "1e200", "-nan(ind)", "1.#QNAN"] {
+            let file = format!("v {bad} {bad} 0\n{SQUARE}v 0 {bad} 0\nf 2 3 4 5\nf 2 3 4\n");
+            let soup = read(file.as_bytes()).unwrap_or_else(|e| panic!("{bad}: {e}"));
+            assert_eq!((soup.triangles().len(), soup.points()[2], soup.points().len()), (3, [1.0, 0.0, 0.0], 6));
+            let used = read(format!("{file}f 2 3 -1\nf 2 3 4 5 6\n").as_bytes()).expect_err(bad).reason();
+            assert_eq!((used.code, used.place.as_deref()), (Code::NotFinite, Some("line 7")), "{}", used.message);
+            assert!(used.message.contains("1 corner is of this sort") && used.message.starts_with("line 7: y of"));
+        }
+    }
+
+    #[test]
     fn errors_name_the_line() {
         let out = error(&format!("{SQUARE}f 1 2 9\n"));
         assert_eq!(out, ObjError::OutOfRange { line: 6, index: 9, vertices: 4 });
-        assert_eq!(
-            error("v 0 nan 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
-            ObjError::NotFinite { line: 1, value: "nan".to_owned() }
+        let comma = error("v 0 0 0\nv 1 0,5 0\nv 0 1 0\nf 1 2 3\n");
+        assert!(comma.to_string().contains("line 2: \"0,5\" is no number, it has a decimal comma"), "{comma}");
+        let fortran = error("v 0 0 1.0D+00\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        assert!(
+            fortran.to_string().contains("line 1: \"1.0D+00\" is no number, it has a Fortran exponent"),
+            "{fortran}"
         );
         assert!(matches!(error("v 0 0 0\nv 1 x 0\nv 0 1 0\nf 1 2 3\n"), ObjError::Syntax { line: 2, .. }));
         assert!(matches!(error(&format!("{SQUARE}f 1 2 z\n")), ObjError::Syntax { line: 6, .. }));
@@ -303,6 +327,6 @@ mod tests {
             error("v 0 0 0\nv 1 0 0\nf -1 -2 -3\nv 0 1 0\n"),
             ObjError::OutOfRange { line: 3, index: -3, .. }
         ));
-        assert!(matches!(read(SQUARE.as_bytes()), Err(ReadError::Soup(SoupError::NoTriangles { .. }))));
+        assert!(matches!(read(SQUARE.as_bytes()), Err(ReadError::Soup { error: SoupError::NoTriangles { .. }, .. })));
     }
 }

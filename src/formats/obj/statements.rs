@@ -1,5 +1,7 @@
 //! The statements of an OBJ file that tell of vertices and faces. Nothing is copied.
 
+use crate::formats::words::{comment, float};
+use pipeline::mesh::TriangleSoup;
 use std::io::{BufRead, Read, Result};
 
 /// What a statement tells.
@@ -29,7 +31,7 @@ impl<'a> Statement<'a> {
         numbers.map(move |word| if faces { word.split(|b| *b == b'/').next().unwrap_or_default() } else { word })
     }
 
-    /// It as the library is to see it, without the end of the line.
+    /// It without the end of the line.
     pub fn write(&self, line: &mut Vec<u8>) {
         line.push(if self.kind == Kind::Vertex { b'v' } else { b'f' });
         for number in self.numbers() {
@@ -37,11 +39,29 @@ impl<'a> Statement<'a> {
             line.extend_from_slice(number);
         }
     }
+
+    /// It as the library is to see it, where some coordinates of the file can be no corner's: they are replaced.
+    fn write_sound(&self, line: &mut Vec<u8>) {
+        let is_sound = |word: &[u8]| float(word).is_some_and(|c| as_shown(c) == c);
+        if self.kind == Kind::Face || self.numbers().all(is_sound) {
+            return self.write(line);
+        }
+        line.push(b'v');
+        for number in self.numbers() {
+            line.push(b' ');
+            line.extend_from_slice(if is_sound(number) { number } else { b"0" });
+        }
+    }
+}
+
+/// A coordinate as the library is to see it: 0 where it can be no corner's.
+pub fn as_shown(coordinate: f64) -> f64 {
+    if TriangleSoup::may_hold(&[coordinate; 3]) { coordinate } else { 0.0 }
 }
 
 /// What a line says, without comment and blanks around; and whether the next one continues it.
 fn content(line: &[u8]) -> (&[u8], bool) {
-    let end = line.iter().position(|b| *b == b'#').unwrap_or(line.len());
+    let end = comment(line).unwrap_or(line.len());
     let line = line[..end].trim_ascii();
     line.strip_suffix(b"\\").map_or((line, false), |line| (line, true))
 }
@@ -112,12 +132,14 @@ pub struct Plain<'a> {
     statements: Statements<'a>,
     line: Vec<u8>,
     at: usize,
+    /// Whether all coordinates can be those of corners.
+    is_sound: bool,
 }
 
 impl<'a> Plain<'a> {
-    /// These statements.
-    pub fn new(statements: Statements<'a>) -> Self {
-        Self { statements, line: Vec::new(), at: 0 }
+    /// These statements, of which some have coordinates that can be no corner's.
+    pub fn new(statements: Statements<'a>, has_bad: bool) -> Self {
+        Self { statements, line: Vec::new(), at: 0, is_sound: !has_bad }
     }
 }
 
@@ -127,7 +149,11 @@ impl BufRead for Plain<'_> {
             self.line.clear();
             self.at = 0;
             if let Some(statement) = self.statements.next() {
-                statement.write(&mut self.line);
+                if self.is_sound {
+                    statement.write(&mut self.line);
+                } else {
+                    statement.write_sound(&mut self.line);
+                }
                 self.line.push(b'\n');
             }
         }
@@ -155,7 +181,7 @@ mod tests {
     fn statements_are_joined_and_stripped() {
         let file = "\u{feff}v 0 0 0 1 # one\n\n  f 1/2/3 \\\n 2//4 # \\\nvt 0 0\n\tfo 3 \\ # two\n\\\n4 \\";
         let mut plain = String::new();
-        Plain::new(Statements::new(file.as_bytes())).read_to_string(&mut plain).expect("text");
+        Plain::new(Statements::new(file.as_bytes()), false).read_to_string(&mut plain).expect("text");
         assert_eq!(plain, "v 0 0 0\nf 1 2\nf 3 4\n");
         let lines: Vec<usize> = Statements::new(file.as_bytes()).map(|s| s.line).collect();
         assert_eq!(lines, [1, 3, 6]);

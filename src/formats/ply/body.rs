@@ -4,6 +4,7 @@ use super::PlyError;
 use super::binary::Plain;
 use super::header::{Element, Header, Property};
 use super::values::{Bad, Values};
+use crate::formats::finish::BadPoints;
 use crate::formats::place::shown;
 use crate::formats::{Limits, Notes, TooMany, polygon};
 use pipeline::space::Vec3;
@@ -20,6 +21,7 @@ pub struct Body<'h> {
     notes: &'h mut Notes,
     pub points: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
+    pub bad: BadPoints,
 }
 
 impl<'h> Body<'h> {
@@ -30,17 +32,18 @@ impl<'h> Body<'h> {
         limits: &'h Limits,
         notes: &'h mut Notes,
     ) -> Result<Self, PlyError> {
-        let mut body = Self { limits, notes, points: Vec::new(), triangles: Vec::new() };
+        let (points, triangles, bad) = (Vec::new(), Vec::new(), BadPoints::default());
+        let mut body = Self { limits, notes, points, triangles, bad };
         body.check(header, values.rest().len())?;
         let mut waiting = Vec::new();
-        let mut points = false;
+        let mut has_points = false;
         for element in &header.elements {
             match element.name.as_str() {
                 "vertex" => {
-                    body.points = read_points(element, &mut values)?;
-                    points = true;
+                    (body.points, body.bad) = read_points(element, &mut values)?;
+                    has_points = true;
                 }
-                "face" | "tristrips" if points => body.surface(element, &mut values)?,
+                "face" | "tristrips" if has_points => body.surface(element, &mut values)?,
                 "face" | "tristrips" => {
                     waiting.push((element, values));
                     skip(element, &mut values)?;
@@ -219,30 +222,25 @@ fn axes(element: &Element) -> Result<[usize; 3], PlyError> {
     Ok(axes)
 }
 
-/// Reads all points.
-fn read_points<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<Vec<Vec3>, PlyError> {
+/// Reads all points, and finds those that can be no corners.
+fn read_points<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<(Vec<Vec3>, BadPoints), PlyError> {
     let axes = axes(element)?;
-    let not_finite = |point: &Vec3, vertex, place| {
-        let value = point.iter().find(|c| !c.is_finite()).map(f64::to_string);
-        value.map_or(Ok(()), |value| Err(PlyError::NotFinite { vertex, value, place }))
-    };
+    let mut bad = BadPoints::default();
     if let Some(table) = values.binary().and_then(|binary| binary.table(element)) {
         let offset = |axis: usize| element.properties[..axis].iter().map(|p| p.scalar.size()).sum();
         let points = table.vectors(axes.map(|a| (offset(a), element.properties[a].scalar)));
-        let broken = points.iter().position(|p| p.iter().any(|c| !c.is_finite()));
-        broken.map_or(Ok(()), |v| not_finite(&points[v], v as u64, table.place(v)))?;
-        return Ok(points);
+        points.iter().enumerate().for_each(|(number, point)| bad.check(number, point, || table.place(number)));
+        return Ok((points, bad));
     }
     // Each point takes at least three bytes, which were counted.
     let mut points = Vec::with_capacity(usize::try_from(element.count).unwrap_or(0));
     for number in 0..element.count {
         let place = values.place();
         let point = read_point(element, axes, values).map_err(|bad| told(bad, element, number, values))?;
-        let place = if values.binary().is_some() { place } else { values.place() };
-        not_finite(&point, number, place)?;
+        bad.check(points.len(), &point, || if values.binary().is_some() { place } else { values.place() });
         points.push(point);
     }
-    Ok(points)
+    Ok((points, bad))
 }
 
 fn read_point<'a>(element: &Element, axes: [usize; 3], values: &mut impl Values<'a>) -> Result<Vec3, Bad> {

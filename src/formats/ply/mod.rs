@@ -10,6 +10,7 @@ mod body;
 mod header;
 mod values;
 
+use super::finish;
 use super::place::Place;
 use super::words::Words;
 use super::{Content, Notes, ReadError, Source, TooMany};
@@ -17,7 +18,6 @@ use crate::outcome::Code;
 use binary::Binary;
 use body::Body;
 use header::{Encoding, Header};
-use pipeline::mesh::TriangleSoup;
 use values::Text;
 
 /// Why bytes are no PLY file.
@@ -105,16 +105,6 @@ pub enum PlyError {
         /// Where.
         place: Place,
     },
-    /// A coordinate is not a number, or infinite.
-    #[error("{place}: vertex {vertex} (from 0) has the coordinate {value}; repair the exporting model")]
-    NotFinite {
-        /// The vertex, from 0.
-        vertex: u64,
-        /// The value.
-        value: String,
-        /// Where the vertex is.
-        place: Place,
-    },
     /// There is more than the header declares.
     #[error(
         "{place}: {bytes} bytes (\"{begins}\") follow all that the header declares; correct its counts, cut the file off there, or export it again"
@@ -136,7 +126,6 @@ impl PlyError {
             Self::NoElement | Self::NoProperty { .. } | Self::Value { .. } => Code::Malformed,
             Self::Count { .. } | Self::Truncated { .. } | Self::Trailing { .. } => Code::CountMismatch,
             Self::TooMany(_) => Code::TooLarge,
-            Self::NotFinite { .. } => Code::NotFinite,
         }
     }
 
@@ -148,10 +137,9 @@ impl PlyError {
             | Self::HeaderEnds { line, .. }
             | Self::NoProperty { line, .. }
             | Self::Count { line, .. } => Some(Place::Line(*line).to_string()),
-            Self::Truncated { place, .. }
-            | Self::Value { place, .. }
-            | Self::NotFinite { place, .. }
-            | Self::Trailing { place, .. } => Some(place.to_string()),
+            Self::Truncated { place, .. } | Self::Value { place, .. } | Self::Trailing { place, .. } => {
+                Some(place.to_string())
+            }
         }
     }
 }
@@ -174,7 +162,8 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
             Body::read(&header, binary, source.limits, &mut notes)?
         }
     };
-    Ok(Content { soup: TriangleSoup::new(body.points, body.triangles)?, notes })
+    let (points, triangles, bad) = (body.points, body.triangles, body.bad);
+    finish::content(points, triangles, notes, &bad)
 }
 
 #[cfg(test)]

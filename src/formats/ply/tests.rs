@@ -174,6 +174,9 @@ fn broken_files_are_refused_with_code_and_place() {
         (good.replace("1 1 0", "1 1 0 7"), Code::Malformed, Some("line 12"), "\"7\" follows"),
         (good.replace("1 1 0", "1 nan 0"), Code::NotFinite, Some("line 12"), "NaN"),
         (good.replace("1 1 0", "1 1 1e999"), Code::NotFinite, Some("line 12"), "inf"),
+        (good.replace("1 1 0", "-1.#IND 1 0"), Code::NotFinite, Some("line 12"), "in 2 triangles"),
+        (good.replace("1 1 0", "1 0,5 0"), Code::Malformed, Some("line 12"), "decimal comma"),
+        (good.replace("1 1 0", "1 1.0D+00 0"), Code::Malformed, Some("line 12"), "Fortran exponent"),
     ];
     for (text, code, place, word) in rows {
         let reason = content(text.as_bytes()).expect_err(&text).reason();
@@ -181,7 +184,21 @@ fn broken_files_are_refused_with_code_and_place() {
         assert!(reason.message.contains(word), "{reason:?}");
     }
     let cloud = square(&[]);
-    assert!(matches!(content(cloud.as_bytes()), Err(ReadError::Soup(SoupError::NoTriangles { points: 4 }))));
+    assert!(matches!(
+        content(cloud.as_bytes()),
+        Err(ReadError::Soup { error: SoupError::NoTriangles { points: 4 }, .. })
+    ));
+}
+
+/// No triangle uses point 3: whatever its coordinates are, the others stay what they are.
+#[test]
+fn points_without_triangles_may_have_any_coordinates() {
+    let good = square(&["3 0 1 2"]);
+    let expected = in_all_encodings(&good).soup;
+    for bad in ["nan nan nan", "0 inf 0", "-1e30 -inf nan"] {
+        let found = in_all_encodings(&good.replace("0 1 0\n3", &format!("{bad}\n3"))).soup;
+        assert_eq!((found.triangles(), &found.points()[..3]), (expected.triangles(), &expected.points()[..3]), "{bad}");
+    }
 }
 
 #[test]
@@ -194,8 +211,11 @@ fn broken_binary_files_are_refused_with_their_byte() {
         bytes[header + at..header + at + new.len()].copy_from_slice(new);
         error(&bytes)
     };
-    let nan = with(16, &f32::NAN.to_be_bytes());
-    assert_eq!(nan, PlyError::NotFinite { vertex: 1, value: "NaN".into(), place: Place::Byte(header + 12) });
+    let mut nan = good.clone();
+    nan[header + 16..header + 20].copy_from_slice(&f32::NAN.to_be_bytes());
+    let nan = content(&nan).expect_err("a corner").reason();
+    assert_eq!((nan.code, nan.place), (Code::NotFinite, Some(format!("byte {}", header + 12))), "{}", nan.message);
+    assert!(nan.message.contains("y of point 1 (from 0) is NaN"), "{}", nan.message);
     let range = with(48 + 1, &4u32.to_be_bytes());
     assert!(matches!(&range, PlyError::Value { number: 0, place: Place::Byte(_), .. }), "{range:?}");
     let length = with(48 + 13, &[200]);

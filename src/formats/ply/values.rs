@@ -3,7 +3,7 @@
 use super::binary::Binary;
 use super::header::Scalar;
 use crate::formats::place::{Place, shown};
-use crate::formats::words::{Words, float, integer};
+use crate::formats::words::{Words, float, integer, no_number};
 
 /// What is wrong with a value.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,8 +65,8 @@ impl<'a> Text<'a> {
     }
 }
 
-fn no_number(word: &[u8]) -> Bad {
-    Bad::Value(format!("\"{}\" is no number", shown(word)))
+fn not_a_number(word: &[u8]) -> Bad {
+    Bad::Value(no_number(word))
 }
 
 impl<'a> Values<'a> for Text<'a> {
@@ -81,13 +81,13 @@ impl<'a> Values<'a> for Text<'a> {
     #[inline]
     fn float(&mut self, _: Scalar) -> Result<f64, Bad> {
         let word = self.word()?;
-        float(word).ok_or_else(|| no_number(word))
+        float(word).ok_or_else(|| not_a_number(word))
     }
 
     #[inline]
     fn integer(&mut self, _: Scalar) -> Result<i64, Bad> {
         let word = self.word()?;
-        integer(word).map_or_else(|| whole(float(word).ok_or_else(|| no_number(word))?), Ok)
+        integer(word).map_or_else(|| whole(float(word).ok_or_else(|| not_a_number(word))?), Ok)
     }
 
     fn skip(&mut self, _: Scalar, count: u64) -> Result<(), Bad> {

@@ -3,12 +3,16 @@
 //! A file is binary when its size is that of its declared triangles (84 + 50 n bytes), whatever its header says:
 //! some binary files begin with "solid". Otherwise it is ASCII when its first word is "solid", in any case and
 //! after any blanks, and text follows. ASCII files may hold several solids; all of them are read. Words count, not
-//! lines: a facet may stand on one line.
+//! lines: a facet may stand on one line. What is neither, is no text, and longer than its declared triangles, is binary
+//! with something appended, which is told and not read. Text that ends after a facet, without `endsolid`, is read, and that
+//! is told; text that ends in a facet is refused.
 
-use super::place::shown;
+use super::finish::{self, BadPoints};
+use super::place::{Place, shown};
+use super::words::{float, foreign_number, no_number};
 use super::{Content, Notes, ReadError, Source, TooMany};
 use crate::outcome::Code;
-use pipeline::mesh::TriangleSoup;
+use pipeline::space::Vec3;
 
 /// Bytes before the triangles of a binary file, and per triangle.
 const HEADER: usize = 84;
@@ -47,9 +51,9 @@ pub enum StlError {
         /// Whole triangles that fit.
         room: usize,
     },
-    /// There are more bytes than the declared number of triangles takes.
+    /// No triangles are declared, but bytes follow.
     #[error(
-        "the header declares {declared} triangles ({needed} bytes), but the file has {size} bytes, room for {room}; correct the count at byte 80, cut the file off after its triangles, or export it again"
+        "the header declares {declared} triangles ({needed} bytes), but the file has {size} bytes, room for {room}; correct the count at byte 80, or export it again"
     )]
     Excess {
         /// Triangles declared.
@@ -64,24 +68,6 @@ pub enum StlError {
     /// There are more triangles than may be.
     #[error(transparent)]
     TooMany(#[from] TooMany),
-    /// A coordinate of a binary file is not a number, or infinite.
-    #[error("triangle {triangle} has the coordinate {value}; repair the exporting model")]
-    BinaryNotFinite {
-        /// The triangle, from 0.
-        triangle: usize,
-        /// Its first byte.
-        byte: usize,
-        /// The value, as text.
-        value: String,
-    },
-    /// A coordinate of an ASCII file is not a number, or infinite.
-    #[error("line {line} has the coordinate {value}; repair the exporting model")]
-    AsciiNotFinite {
-        /// The line, from 1.
-        line: usize,
-        /// The word found.
-        value: String,
-    },
     /// A line of an ASCII file makes no sense.
     #[error("line {line}: {problem}; correct it or export the file again, as binary STL if you can")]
     Syntax {
@@ -103,7 +89,6 @@ impl StlError {
         match self {
             Self::Count { .. } | Self::Excess { .. } => Code::CountMismatch,
             Self::TooMany(_) => Code::TooLarge,
-            Self::BinaryNotFinite { .. } | Self::AsciiNotFinite { .. } => Code::NotFinite,
             Self::Short { .. } | Self::NoSolid { .. } => Code::Malformed,
             Self::Syntax { .. } | Self::Truncated { .. } => Code::Malformed,
         }
@@ -115,10 +100,7 @@ impl StlError {
             Self::NoSolid { .. } => "line 1".to_owned(),
             Self::Count { .. } | Self::Excess { .. } => "byte 80".to_owned(),
             Self::TooMany(_) => return None,
-            Self::BinaryNotFinite { byte, .. } => format!("byte {byte}"),
-            Self::AsciiNotFinite { line, .. } | Self::Syntax { line, .. } | Self::Truncated { line } => {
-                format!("line {line}")
-            }
+            Self::Syntax { line, .. } | Self::Truncated { line } => format!("line {line}"),
         })
     }
 }
@@ -126,19 +108,42 @@ impl StlError {
 /// Reads an STL file. The limit of elements holds for its triangles: it has no other points than their corners.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let (bytes, limit) = (source.bytes, source.limits.elements);
-    let declared = declared(bytes);
-    let size_fits = declared.is_some_and(|n| needed(n) == bytes.len() as u64);
-    let mut notes = Notes::new(if size_fits { "STL, binary" } else { "STL, ASCII" });
-    let points = if size_fits {
-        TooMany::check("triangles", declared.unwrap_or(0).into(), limit).map_err(StlError::from)?;
-        binary(&bytes[HEADER..])?
-    } else if begins_with_solid(unfilled(bytes)) {
-        ascii(unfilled(bytes), limit, &mut notes)?
-    } else {
-        return Err(mismatch(declared, bytes).into());
+    let size = bytes.len() as u64;
+    let (facets, notes) = match declared(bytes) {
+        Some(declared) if needed(declared) == size => binary_file(bytes, declared, limit)?,
+        _ if begins_with_solid(unfilled(bytes)) => {
+            let mut notes = Notes::new("STL, ASCII");
+            (ascii(unfilled(bytes), limit, &mut notes)?, notes)
+        }
+        // Some programs append their own data. (Four letters of text would be a count of 7 GB and more.)
+        Some(declared @ 1..) if needed(declared) < size => binary_file(bytes, declared, limit)?,
+        declared => return Err(mismatch(declared, bytes).into()),
     };
-    let triangles = (0..points.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    Ok(Content { soup: TriangleSoup::new(points, triangles)?, notes })
+    let triangles = (0..facets.corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    finish::content(facets.corners, triangles, notes, &facets.bad)
+}
+
+/// The corners of all triangles, three each.
+#[derive(Default)]
+struct Facets {
+    corners: Vec<Vec3>,
+    bad: BadPoints,
+}
+
+/// Reads the declared triangles of a binary file; what follows them is told.
+fn binary_file(bytes: &[u8], declared: u32, limit: u64) -> Result<(Facets, Notes), StlError> {
+    TooMany::check("triangles", declared.into(), limit)?;
+    let mut notes = Notes::new("STL, binary");
+    let (records, rest) = bytes[HEADER..].split_at(needed(declared) as usize - HEADER);
+    if !rest.is_empty() {
+        let room = rest.len() / RECORD;
+        notes.remark(format!(
+            "{} bytes follow the {declared} triangles that the header declares (room for {room} more), and were not \
+             read; if a part of the surface is missing, correct the count at byte 80, or export the file again",
+            rest.len()
+        ));
+    }
+    Ok((binary(records), notes))
 }
 
 fn declared(bytes: &[u8]) -> Option<u32> {
@@ -151,11 +156,10 @@ fn needed(triangles: u32) -> u64 {
 
 fn mismatch(declared: Option<u32>, bytes: &[u8]) -> StlError {
     let size = bytes.len();
-    let is_text = bytes.iter().take(1024).all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace());
     match declared {
         None => StlError::Short { size },
         // What it would be as a count are four letters.
-        Some(_) if is_text => StlError::NoSolid { begins: shown(text(bytes)) },
+        Some(_) if is_text(bytes) => StlError::NoSolid { begins: shown(text(bytes)) },
         Some(declared) => {
             let (needed, room) = (needed(declared), (size - HEADER) / RECORD);
             if needed > size as u64 {
@@ -165,6 +169,11 @@ fn mismatch(declared: Option<u32>, bytes: &[u8]) -> StlError {
             }
         }
     }
+}
+
+/// Whether a file begins with text.
+fn is_text(bytes: &[u8]) -> bool {
+    bytes.iter().take(1024).all(|b| b.is_ascii_graphic() || b.is_ascii_whitespace())
 }
 
 /// Whether the first word is "solid" and what follows is text: a binary header may begin with the word, too.
@@ -186,21 +195,18 @@ fn text(bytes: &[u8]) -> &[u8] {
 }
 
 /// The corners of all triangles: three vectors of three little-endian floats after each normal.
-fn binary(records: &[u8]) -> Result<Vec<[f64; 3]>, StlError> {
-    let mut points = Vec::with_capacity(records.len() / RECORD * 3);
+fn binary(records: &[u8]) -> Facets {
+    let mut facets = Facets { corners: Vec::with_capacity(records.len() / RECORD * 3), bad: BadPoints::default() };
     for (triangle, record) in records.chunks_exact(RECORD).enumerate() {
         for corner in record[12..48].chunks_exact(12) {
             let coordinate =
                 |k: usize| f32::from_le_bytes([corner[4 * k], corner[4 * k + 1], corner[4 * k + 2], corner[4 * k + 3]]);
             let point = [0, 1, 2].map(|k| f64::from(coordinate(k)));
-            if let Some(value) = point.iter().find(|c| !c.is_finite()) {
-                let byte = HEADER + RECORD * triangle;
-                return Err(StlError::BinaryNotFinite { triangle, byte, value: value.to_string() });
-            }
-            points.push(point);
+            facets.bad.check(facets.corners.len(), &point, || Place::Byte(HEADER + RECORD * triangle));
+            facets.corners.push(point);
         }
     }
-    Ok(points)
+    facets
 }
 
 /// The words of a file, each with its line (from 1). Lines end with a line feed, a carriage return, or both.
@@ -254,19 +260,20 @@ fn is(word: &[u8], keyword: &str) -> bool {
 }
 
 /// The corners of all triangles of all solids.
-fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Vec<[f64; 3]>, StlError> {
-    let mut points: Vec<[f64; 3]> = Vec::new();
+fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Facets, StlError> {
+    let mut facets = Facets::default();
     let mut words = Words::new(text(bytes));
     words.line += bytes[..bytes.len() - text(bytes).len()].iter().filter(|b| **b == b'\n').count();
     let mut in_solid = false;
     // Corners of the facet at hand; none outside of facets.
     let mut corners: Option<usize> = None;
+    let mut ends_with_facet = false;
     while let Some((word, _)) = words.next() {
         let line = words.line;
         let problem = |problem: &str| StlError::Syntax { line, problem: problem.to_owned() };
         match (word.to_ascii_lowercase().as_slice(), corners) {
             (b"solid", None) => {
-                in_solid = true;
+                (in_solid, ends_with_facet) = (true, false);
                 let rest = words.rest;
                 words.name();
                 notes.name(&String::from_utf8_lossy(&rest[..rest.len() - words.rest.len()]));
@@ -276,38 +283,40 @@ fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Vec<[f64; 3]>, S
                 words.name();
             }
             (b"facet", None) if in_solid => {
-                TooMany::check("triangles", points.len() as u64 / 3 + 1, limit)?;
+                TooMany::check("triangles", facets.corners.len() as u64 / 3 + 1, limit)?;
                 corners = Some(0);
             }
             (b"vertex", Some(n)) if n < 3 => {
-                points.push(vertex(&mut words)?);
+                let point = vertex(&mut words)?;
+                facets.bad.check(facets.corners.len(), &point, || Place::Line(words.line));
+                facets.corners.push(point);
                 corners = Some(n + 1);
             }
             (b"vertex", Some(_)) => return Err(problem("a facet has more than three vertices")),
-            (b"endfacet", Some(3)) => corners = None,
+            (b"endfacet", Some(3)) => (corners, ends_with_facet) = (None, true),
             (b"endfacet", Some(n)) => return Err(problem(&format!("a facet ends after {n} vertices"))),
             (b"solid" | b"endsolid" | b"facet", Some(n)) => {
                 return Err(problem(&format!("\"{}\" in the middle of a facet ({n} vertices so far)", shown(word))));
             }
             // The normal, "outer loop", "endloop": they say nothing that the corners do not.
             (b"normal" | b"outer" | b"loop" | b"endloop", Some(_)) => {}
-            (_, Some(_)) if number(word).is_some() || is_undefined(word) => {}
+            (_, Some(_)) if float(word).is_some() => {}
+            (_, Some(_)) if foreign_number(word).is_some() => return Err(problem(&no_number(word))),
             (b"color", _) => words.name(),
             _ => return Err(problem(&format!("unexpected \"{}\"", shown(word)))),
         }
     }
-    if in_solid { Err(StlError::Truncated { line: words.line }) } else { Ok(points) }
-}
-
-fn number(word: &[u8]) -> Option<f64> {
-    std::str::from_utf8(word).ok().and_then(|w| w.parse::<f64>().ok())
-}
-
-/// Whether a word is what Microsoft's libraries write for a number that is none, as in the normal of a triangle without
-/// area: `-nan(ind)`, `-1.#IND`, `1.#QNAN00e+000`.
-fn is_undefined(word: &[u8]) -> bool {
-    let word = word.strip_prefix(b"-").or(word.strip_prefix(b"+")).unwrap_or(word).to_ascii_lowercase();
-    word.starts_with(b"nan(") || word.starts_with(b"1.#")
+    let line = words.line;
+    if in_solid && !(ends_with_facet && corners.is_none()) {
+        return Err(StlError::Truncated { line });
+    }
+    if in_solid {
+        notes.remark(format!(
+            "the file ends at line {line} without \"endsolid\", after a complete facet; if a part of the surface is \
+             missing, it was cut off: copy or export it again"
+        ));
+    }
+    Ok(facets)
 }
 
 /// The three numbers of a vertex; a fourth one is an error.
@@ -318,17 +327,11 @@ fn vertex(words: &mut Words) -> Result<[f64; 3], StlError> {
         let Some((word, _)) = words.next() else {
             return Err(syntax(words.line, "a vertex needs three numbers".to_owned()));
         };
-        let undefined = is_undefined(word).then_some(f64::NAN);
-        *c = number(word)
-            .or(undefined)
-            .ok_or_else(|| syntax(words.line, format!("\"{}\" is no number", shown(word))))?;
-        if !c.is_finite() {
-            return Err(StlError::AsciiNotFinite { line: words.line, value: shown(word) });
-        }
+        *c = float(word).ok_or_else(|| syntax(words.line, no_number(word)))?;
     }
     let mut ahead = Words { rest: words.rest, line: words.line };
     match ahead.next() {
-        Some((word, _)) if number(word).is_some() => {
+        Some((word, _)) if float(word).is_some() => {
             let problem = format!("\"{}\" follows the three numbers of a vertex", shown(word));
             Err(StlError::Syntax { line: ahead.line, problem })
         }

@@ -1,6 +1,7 @@
 use super::*;
 
 use crate::formats::{Limits, Nothing};
+use pipeline::mesh::TriangleSoup;
 
 fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
     limited(bytes, &Limits::default())
@@ -69,11 +70,43 @@ fn count_and_size_must_agree() {
     let file = binary_file(b"", 3, &[TRIANGLE; 2]);
     assert_eq!(error(&file), StlError::Count { declared: 3, needed: 234, size: 184, room: 2 });
     assert!(matches!(error(&file[..100]), StlError::Count { room: 0, .. }));
-    let longer = [binary_file(b"", 1, &[TRIANGLE]), vec![0; 7]].concat();
-    assert!(matches!(error(&longer), StlError::Excess { declared: 1, size: 141, .. }));
+    let none = [binary_file(b"", 0, &[]), vec![0; 50]].concat();
+    assert_eq!(error(&none), StlError::Excess { declared: 0, needed: 84, size: 134, room: 1 });
     let named = binary_file(b"solid part", 3, &[TRIANGLE; 2]);
     assert!(matches!(error(&named), StlError::Count { .. }), "binary, though it begins with solid");
     assert_eq!(error(b"abc"), StlError::Short { size: 3 });
+}
+
+fn remarks(bytes: &[u8]) -> (usize, Vec<String>) {
+    let content = super::read(&Source { bytes, limits: &Limits::default(), beside: &Nothing }).expect("read");
+    (content.soup.triangles().len(), content.notes.remarks)
+}
+
+#[test]
+fn what_follows_all_triangles_of_a_binary_file_is_told() {
+    for header in [&b"binary"[..], b"solid but binary"] {
+        for (rest, told) in [(vec![0; 7], "7 bytes follow the 2 triangles"), (vec![1; 123], "room for 2 more")] {
+            let (triangles, remarks) = remarks(&[binary_file(header, 2, &[TRIANGLE; 2]), rest].concat());
+            assert!(triangles == 2 && remarks.len() == 1 && remarks[0].contains(told), "{remarks:?}");
+        }
+    }
+    assert_eq!(remarks(&binary_file(b"", 2, &[TRIANGLE; 2])), (2, vec![]));
+}
+
+#[test]
+fn a_missing_end_after_a_facet_is_told() {
+    let two = format!("solid a\n{}endsolid a\nsolid b\n{}", facet("0"), facet("1"));
+    for text in [&two[..], two.trim_end(), &two[two.find("solid b").expect("there")..]] {
+        let (_, remarks) = remarks(text.as_bytes());
+        assert!(
+            remarks.len() == 1 && remarks[0].contains("without \"endsolid\", after a complete facet"),
+            "{remarks:?}"
+        );
+    }
+    assert_eq!(remarks(format!("{two}endsolid").as_bytes()), (2, vec![]));
+    for cut in ["solid\n", &two[..two.find("facet normal 0 0 1\nouter loop\nvertex 1").expect("there")]] {
+        assert!(matches!(error(cut.as_bytes()), StlError::Truncated { .. }), "{cut}");
+    }
 }
 
 #[test]
@@ -93,12 +126,19 @@ fn too_many_triangles_are_refused_by_the_name_of_the_setting() {
 fn broken_numbers_are_named_with_their_place() {
     let mut bad = TRIANGLE;
     bad[4] = f32::NAN;
-    assert!(matches!(
-        error(&binary_file(b"", 2, &[TRIANGLE, bad])),
-        StlError::BinaryNotFinite { triangle: 1, byte: 134, .. }
-    ));
+    let refused = |bytes: &[u8]| read(bytes).expect_err("a corner").reason();
+    let reason = refused(&binary_file(b"", 3, &[TRIANGLE, bad, bad]));
+    assert_eq!((reason.code, reason.place.as_deref()), (Code::NotFinite, Some("byte 134")));
+    assert!(reason.message.contains("y of point 4 (from 0) is NaN, and triangle 1 has a corner there"), "{reason:?}");
+    assert!(reason.message.contains("2 corners are of this sort") && reason.message.contains("in 2 triangles"));
+    let reason = refused(format!("solid\n{}endsolid", facet("inf")).as_bytes());
+    assert_eq!((reason.code, reason.place.as_deref()), (Code::NotFinite, Some("line 4")));
     let ascii = |x| error(format!("solid\n{}endsolid", facet(x)).as_bytes());
-    assert_eq!(ascii("inf"), StlError::AsciiNotFinite { line: 4, value: "inf".to_owned() });
+    for (word, told) in [("1,5", "decimal comma"), ("1.5D+00", "Fortran exponent"), ("x", "\"x\" is no number;")] {
+        assert!(ascii(word).to_string().contains(told), "{}", ascii(word));
+    }
+    let normal = format!("solid\n{}endsolid", facet("0").replace("0 0 1", "0,0 0,0 1,0"));
+    assert!(error(normal.as_bytes()).to_string().contains("decimal comma"));
     assert!(matches!(ascii("1,5"), StlError::Syntax { line: 4, .. }));
     assert!(matches!(ascii("1 2"), StlError::Syntax { line: 4, .. }));
 }
@@ -109,8 +149,8 @@ fn numbers_that_are_none_are_passed_over_in_normals_only() {
         let normal = format!("normal {broken} {broken} {broken}");
         let file = |facet: String| format!("solid\n{facet}endsolid").into_bytes();
         assert!(read(&file(facet("0").replace("normal 0 0 1", &normal))).is_ok(), "{broken}");
-        let found = error(&file(facet(broken)));
-        assert_eq!(found, StlError::AsciiNotFinite { line: 4, value: broken.to_owned() });
+        let found = read(&file(facet(broken))).expect_err(broken).reason();
+        assert_eq!((found.code, found.place.as_deref()), (Code::NotFinite, Some("line 4")), "{broken}");
     }
     assert!(read(b"solid\nfacet normal a b c").is_err());
 }
@@ -137,11 +177,12 @@ fn text_of_another_kind_is_told() {
 #[test]
 fn cut_off_and_garbled_files_are_refused() {
     let whole = format!("solid\n{}endsolid", facet("0"));
-    for end in 6..whole.len() - 8 {
+    let facet_ends = whole.len() - "\nendsolid".len();
+    for end in (6..facet_ends).chain(facet_ends + 2..whole.len()) {
         assert!(read(&whole.as_bytes()[..end]).is_err(), "cut at {end}");
     }
     assert!(matches!(error(b"solid\nvertex 0 0 0\nendsolid"), StlError::Syntax { line: 2, .. }));
     assert!(matches!(error(b"\n\nsolid\n\nfacet normal 0 0 1 nonsense"), StlError::Syntax { line: 5, .. }));
-    assert!(matches!(read(b"solid\nendsolid"), Err(ReadError::Soup(_))), "no triangles");
-    assert!(matches!(read(&binary_file(b"", 0, &[])), Err(ReadError::Soup(_))), "no triangles");
+    assert!(matches!(read(b"solid\nendsolid"), Err(ReadError::Soup { .. })), "no triangles");
+    assert!(matches!(read(&binary_file(b"", 0, &[])), Err(ReadError::Soup { .. })), "no triangles");
 }

@@ -108,14 +108,6 @@ pub enum VtkError {
         /// Length of the connectivity.
         length: usize,
     },
-    /// There are cells, but none of a surface.
-    #[error(
-        "the file holds no surface, only {found}; in ParaView apply the filter Extract Surface and save the result as .vtp"
-    )]
-    NoSurface {
-        /// What there is.
-        found: String,
-    },
 }
 
 /// Why an array cannot be decoded.
@@ -163,7 +155,6 @@ impl VtkError {
             Self::Dataset { .. } => Code::UnsupportedFormat,
             Self::Count { .. } | Self::Packed { problem: PackedError::Short { .. }, .. } => Code::CountMismatch,
             Self::TooLarge { .. } | Self::Packed { problem: PackedError::Expansion { .. }, .. } => Code::TooLarge,
-            Self::NoSurface { .. } => Code::NoTriangles,
             _ => Code::Malformed,
         }
     }
@@ -179,7 +170,6 @@ impl VtkError {
             Self::OutOfRange { cell, section, .. }
             | Self::Corners { cell, section, .. }
             | Self::Offset { cell, section, .. } => Some(format!("{section}, cell {cell}")),
-            Self::NoSurface { .. } => None,
         }
     }
 }

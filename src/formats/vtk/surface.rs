@@ -2,8 +2,8 @@
 
 use super::cell::{self, Kind};
 use super::error::{Place, VtkError};
+use crate::formats::finish::{self, BadPoints};
 use crate::formats::{Content, Limits, Notes, ReadError, polygon};
-use pipeline::mesh::TriangleSoup;
 use pipeline::space::Vec3;
 
 /// The types of cells.
@@ -169,11 +169,7 @@ impl<'a> Surface<'a> {
             self.notes.skip(cell::name(cell_type), count);
         }
         self.notes.mid_nodes = self.mid_nodes.iter().filter(|mid| **mid).count();
-        if self.triangles.is_empty() && !self.notes.skipped.is_empty() {
-            let found: Vec<String> = self.notes.skipped.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
-            return Err(VtkError::NoSurface { found: found.join(", ") }.into());
-        }
-        Ok(Content { soup: TriangleSoup::new(self.points, self.triangles)?, notes: self.notes })
+        finish::content(self.points, self.triangles, self.notes, &BadPoints::default())
     }
 }
 
@@ -235,10 +231,21 @@ mod tests {
 
     #[test]
     fn other_cells_are_counted_by_their_names() {
-        for (cell_type, corners) in [(10, 4), (42, 12), (3, 2), (7, 2), (6, 2), (200, 1), (0, 0)] {
+        let told = [
+            (10, 4, "tetrahedron; their"),
+            (27, 13, "quadratic pyramid; their"),
+            (42, 12, "polyhedron; their"),
+            (3, 2, "line; points"),
+            (7, 2, "polygon;"),
+            (6, 2, "triangle strip;"),
+            (200, 1, "cells of unknown type;"),
+            (0, 0, "empty cell;"),
+        ];
+        for (cell_type, corners, told) in told {
             let error = add(cell_type, &vec![0; corners]).expect_err("no surface");
+            assert_eq!(error.notes().map(|notes| notes.skipped[cell::name(cell_type)]), Some(1));
             let text = error.reason().message;
-            assert!(text.contains(&format!("only 1 {}", cell::name(cell_type))), "{text}");
+            assert!(text.contains(&format!("only 1 {told}")), "{text}");
         }
     }
 

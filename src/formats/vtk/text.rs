@@ -1,6 +1,7 @@
 //! Words and numbers of text, with the place of what is wrong.
 
 use super::error::{Place, VtkError, shown};
+use crate::formats::words::{float, remedy};
 use pipeline::space::Vec3;
 
 /// Text of a file, read from its front.
@@ -60,25 +61,15 @@ impl<'a> Text<'a> {
         Err(VtkError::Count { place: self.place(), what: what.to_owned(), declared, there })
     }
 
-    fn number<T: std::str::FromStr>(&mut self, kind: &str, what: &str) -> Result<Option<T>, VtkError> {
-        let Some(word) = self.word() else { return Ok(None) };
-        let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
-        match number {
-            Some(number) => Ok(Some(number)),
-            None => Err(self.syntax(format!("\"{}\" is no {kind} of {what}", shown(word)))),
-        }
-    }
-
     /// This many points.
     pub fn points(&mut self, what: &str, count: u64) -> Result<Vec<Vec3>, VtkError> {
         let declared = count.saturating_mul(3);
         self.expect(what, declared)?;
         let mut points = vec![[0.0; 3]; count as usize];
         for (there, coordinate) in (0..).zip(points.as_flattened_mut()) {
-            match self.number("coordinate", what)? {
-                Some(number) => *coordinate = number,
-                None => return Err(self.count(what, declared, there)),
-            }
+            let Some(word) = self.word() else { return Err(self.count(what, declared, there)) };
+            let problem = || format!("\"{}\" is no coordinate of {what}{}", shown(word), remedy(word));
+            *coordinate = float(word).ok_or_else(|| self.syntax(problem()))?;
         }
         Ok(points)
     }
@@ -88,10 +79,9 @@ impl<'a> Text<'a> {
         self.expect(what, count)?;
         let mut ids = vec![0; count as usize];
         for (there, id) in (0..).zip(&mut ids) {
-            match self.number("whole number", what)? {
-                Some(number) => *id = number,
-                None => return Err(self.count(what, count, there)),
-            }
+            let Some(word) = self.word() else { return Err(self.count(what, count, there)) };
+            let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
+            *id = number.ok_or_else(|| self.syntax(format!("\"{}\" is no whole number of {what}", shown(word))))?;
         }
         Ok(ids)
     }

@@ -9,6 +9,10 @@ pub const CASES: &[Case] = &[
     Case::new("OBJ short", "obj", obj_short).packed(),
     Case::new("STL text", "stl", stl_text).packed().with_points(|s| 3 * s.triangles.len()),
     Case::new("PLY text", "ply", ply_text).packed(),
+    Case::new("OFF", "off", |s| off(s, false)).packed(),
+    Case::new("OFF quads", "off", |s| off(s, true)).packed(),
+    Case::new("MEDIT", "mesh", |s| medit(s, false)).packed(),
+    Case::new("MEDIT quads", "mesh", |s| medit(s, true)).packed(),
 ];
 
 /// Vertices with six decimals.
@@ -63,6 +67,32 @@ fn ply_text(surface: &Surface) -> Vec<u8> {
     surface.points.iter().for_each(|[x, y, z]| text += &format!("{x:.6} {y:.6} {z:.6}\n"));
     surface.triangles.iter().for_each(|t| text += &format!("3 {}\n", words(t.iter())));
     text.into_bytes()
+}
+
+/// The faces of a surface, quads where they are asked for.
+fn faces(surface: &Surface, quads: bool) -> Vec<&[u32]> {
+    if quads {
+        surface.quads.iter().map(|q| &q[..]).collect()
+    } else {
+        surface.triangles.iter().map(|t| &t[..]).collect()
+    }
+}
+
+fn off(surface: &Surface, quads: bool) -> Vec<u8> {
+    let faces = faces(surface, quads);
+    let mut text = format!("OFF\n{} {} 0\n", surface.points.len(), faces.len());
+    surface.points.iter().for_each(|[x, y, z]| text += &format!("{x:.6} {y:.6} {z:.6}\n"));
+    faces.iter().for_each(|f| text += &format!("{} {}\n", f.len(), words(f.iter())));
+    text.into_bytes()
+}
+
+fn medit(surface: &Surface, quads: bool) -> Vec<u8> {
+    let faces = faces(surface, quads);
+    let mut text = format!("MeshVersionFormatted 2\nDimension 3\nVertices\n{}\n", surface.points.len());
+    surface.points.iter().for_each(|[x, y, z]| text += &format!("{x:.6} {y:.6} {z:.6} 0\n"));
+    text += &format!("{}\n{}\n", if quads { "Quadrilaterals" } else { "Triangles" }, faces.len());
+    faces.iter().for_each(|f| text += &format!("{} 0\n", words(f.iter().map(|c| c + 1))));
+    (text + "End\n").into_bytes()
 }
 
 fn words(numbers: impl Iterator<Item = impl ToString>) -> String {

@@ -9,6 +9,8 @@ pub fn end(bytes: &[u8]) -> usize {
         _ if bytes.starts_with(b"ply") => end_of_line(behind(b"end_header")),
         _ if bytes.starts_with(b"# vtk") => end_of_line(behind(b"DATASET")),
         _ if bytes.starts_with(b"$MeshFormat") => end_of_line(behind(b"$EndMeshFormat")),
+        _ if bytes.starts_with(b"MeshVersionFormatted") => end_of_line(end_of_line(0)),
+        _ if bytes.starts_with(b"OFF") || bytes.starts_with(b"STCNOFF") => end_of_line(0),
         _ if bytes.starts_with(b"<") => find(bytes, b"<Piece").map_or(bytes.len(), |at| tag_end(bytes, at)),
         _ if bytes.starts_with(b"glTF") => chunk_end(bytes, 12),
         _ if bytes.starts_with(b"{") => bytes.len(),
@@ -50,6 +52,8 @@ fn heads_end_where_data_begin() {
     assert_eq!(rest(b"ply\nformat ascii 1.0\nend_header\n1 2"), b"1 2");
     assert_eq!(rest(b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS"), b"POINTS");
     assert_eq!(rest(b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes"), b"$Nodes");
+    assert_eq!(rest(b"MeshVersionFormatted 2\nDimension 3\nVertices"), b"Vertices");
+    assert_eq!(rest(b"OFF 4 2 0\n0 0 0"), b"0 0 0");
     assert_eq!(rest(b"<VTKFile>\n<Piece NumberOfPoints=\"1\">\n</Piece>"), b"\n</Piece>");
     assert_eq!(rest(b"glTF\x02\0\0\0\x22\0\0\0\x04\0\0\0JSON{  }\x02\0\0\0BIN\0ab"), b"ab");
     assert_eq!(rest(b"solid a\nfacet"), b"facet");

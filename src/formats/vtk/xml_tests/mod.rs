@@ -195,7 +195,7 @@ fn bombs_are_refused() {
     {
         let file = appended(name, 1 << 18, &[words(&[1, 3 << 20, 0, packed.len() as u64]), packed.clone()].concat());
         assert!(
-            matches!(limited(&file, Limits::default()), Err(ReadError::Soup(_))),
+            matches!(limited(&file, Limits::default()), Err(ReadError::Soup { .. })),
             "{name}: points and no triangles"
         );
         let refused = limited(&file, Limits { expansion: 2, ..Limits::default() }).expect_err("a bomb").reason();
