@@ -1,6 +1,7 @@
 //! The tests of the program as a whole: they drive the real binary and look at what it wrote, with the real VTK.
 
 mod check;
+mod check_mesh;
 mod corpus;
 mod daemon;
 mod doubts;

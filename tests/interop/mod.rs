@@ -49,11 +49,12 @@ fn script(name: &str) -> Command {
     command
 }
 
-/// The PATH on which the programs of the environment (`gmsh`, `python`) are found first.
+/// The PATH on which the programs of the environment (`gmsh`, `python`) and planish are found first.
 pub fn tools() -> OsString {
     let own = PYTHON.parent().expect("a folder").to_owned();
     let inherited = std::env::var_os("PATH").unwrap_or_default();
-    let folders = std::iter::once(own).chain(std::env::split_paths(&inherited));
+    let program = Path::new(env!("CARGO_BIN_EXE_planish")).parent().expect("a folder").to_owned();
+    let folders = [own, program].into_iter().chain(std::env::split_paths(&inherited));
     std::env::join_paths(folders).expect("no folder has a colon in its name")
 }
 

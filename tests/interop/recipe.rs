@@ -3,6 +3,7 @@
 use super::{run, script, tools};
 use crate::support::{Out, fixture, planish, root};
 use planish::hooks::{self, Hook, Outcome, Target};
+use planish::report::mesh::MeshReport;
 use planish::settings::{OnCertified, Said};
 use std::path::Path;
 
@@ -51,10 +52,37 @@ fn the_recipe_makes_a_mesh_and_nothing_else() {
     assert_eq!(account.failure(), None);
     let mut after: Vec<String> = files(target.folder());
     after.retain(|f| !before.contains(f));
-    assert_eq!(after, ["hooks.json", "remeshed.msh"]);
+    assert_eq!(after, ["hooks.json", "mesh.json", "remeshed.msh"]);
+    let found = std::fs::read(target.folder().join("mesh.json")).expect("there");
+    let found: MeshReport = serde_json::from_slice(&found).expect("a report");
+    assert!(found.faithful && found.fine && found.by_charts, "{found:?}");
+    let schema = root().join("docs/mesh.schema.json");
+    run(script("validate_schema.py").arg(schema).arg(target.folder().join("mesh.json")), "mesh.json breaks its schema");
     let mesh = std::fs::read_to_string(target.folder().join("remeshed.msh")).expect("text");
     assert!(mesh.starts_with("$MeshFormat\n4.1 ") && mesh.contains("\n$Elements\n"), "no mesh of Gmsh's");
     assert!(!hooks::are_due(&recipe, &target));
+    assert_proven(&target);
+}
+
+#[test]
+fn a_mesh_that_is_not_faithful_is_told() {
+    let out = Out::new();
+    let target = result(&out);
+    let said: Said = toml::from_str(&settings_file()).expect("valid");
+    let mut recipe: Vec<Hook> = said.check().expect("in range").on_certified.iter().map(with_tools).collect();
+    // In the place of the mesher, one that makes a single triangle.
+    let lose = "printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' > \"$1\"/remeshed.obj";
+    let command = ["sh", "-c", lose, "sh", "{folder}"].map(str::to_owned).into();
+    recipe[0] = Hook::new(OnCertified { command, time_limit: 60.0 }).expect("valid");
+    let OnCertified { command, time_limit } = recipe[1].configured().clone();
+    let command = command.iter().map(|part| part.replace("remeshed.msh", "remeshed.obj")).collect();
+    recipe[1] = Hook::new(OnCertified { command, time_limit }).expect("valid");
+    let account = hooks::run(&recipe, &target, out.path(), &|| true).expect("the system helps").expect("an account");
+    assert!(account.failure().is_some(), "{account:?}");
+    let outcomes: Vec<Outcome> = account.commands.iter().map(|c| c.outcome).collect();
+    assert_eq!(outcomes, [Outcome::Succeeded, Outcome::Failed]);
+    let text = std::fs::read_to_string(target.folder().join(hooks::FILE)).expect("written");
+    assert!(text.contains("not faithful"), "{text}");
     assert_proven(&target);
 }
 

@@ -1,4 +1,4 @@
-"""verify_remesh.py [--seconds N] [--any-size] RESULT...: remeshes each result with the real Gmsh (`gmsh remesh.geo -2`,
+"""verify_remesh.py [--seconds N] [--any-size] [--keep] RESULT...: remeshes each result with the real Gmsh (`gmsh remesh.geo -2`,
 no other flags, in a copy of the hand-off) and looks at what came out:
 
 - Gmsh reads the triangles of the input from atlas.msh, and its maps are those of surface.vtu;
@@ -45,16 +45,19 @@ def read_surface(path):
     return places, number.reshape(-1)[triangles.reshape(-1, 3)], vtk_to_numpy(grid.GetCellData().GetArray("chart"))
 
 
-def remesh(folder, seconds):
+def remesh(folder, seconds, keep):
     """Runs Gmsh on a copy of the hand-off; nodes, triangles with their surfaces, and edges along curves."""
     with tempfile.TemporaryDirectory() as scratch:
-        for name in ("atlas.msh", "remesh.geo"):
-            shutil.copy(os.path.join(folder, name), scratch)
+        for name in ("atlas.msh", "atlas-enlarged.msh", "remesh.geo"):
+            if os.path.exists(os.path.join(folder, name)):
+                shutil.copy(os.path.join(folder, name), scratch)
         command = [sys.executable, os.path.join(os.path.dirname(sys.executable), "gmsh"), "remesh.geo", "-2"]
         done = subprocess.run(command, cwd=scratch, timeout=seconds, capture_output=True, text=True)
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.startswith(("Error", "Warning"))]
         assert done.returncode == 0, f"Gmsh ends with {done.returncode}: {said}"
         assert not any(line.startswith("Error") for line in said), said
+        if keep:
+            shutil.copy(os.path.join(scratch, "remesh.msh"), folder)
         return read_mesh(os.path.join(scratch, "remesh.msh")) + (said,)
 
 
@@ -241,12 +244,12 @@ def verify_sizes(points, triangles, lines, size):
         assert 0.5 * size < median < 1.5 * size, f"{what}: median length {median:.4g}, asked for {size:.4g}"
 
 
-def verify(folder, seconds, sizes):
+def verify(folder, seconds, sizes, keep):
     report = json.load(open(os.path.join(folder, "report.json"), encoding="utf-8"))
     surface, faces, charts = read_surface(os.path.join(folder, "surface.vtu"))
     diagonal = numpy.linalg.norm(surface.max(0) - surface.min(0))
     verify_atlas(folder, report["hand_off"]["linear_charts"], diagonal)
-    points, triangles, surfaces, lines, said = remesh(folder, seconds)
+    points, triangles, surfaces, lines, said = remesh(folder, seconds, keep)
     assert sorted(set(surfaces)) == sorted(set(charts)), "every chart has triangles"
     assert len(numpy.unique(numpy.sort(triangles, 1), axis=0)) == len(triangles), "two triangles on the same nodes"
     assert euler(triangles) == euler(faces), f"Euler number {euler(triangles)}, the input has {euler(faces)}"
@@ -264,12 +267,13 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=120.0, help="time that Gmsh may take for one result")
     parser.add_argument("--any-size", action="store_true", help="do not look at the lengths of edges")
+    parser.add_argument("--keep", action="store_true", help="leave remesh.msh in the result folder")
     parser.add_argument("results", nargs="+")
     arguments = parser.parse_args()
     good = True
     for folder in arguments.results:
         try:
-            verify(folder, arguments.seconds, not arguments.any_size)
+            verify(folder, arguments.seconds, not arguments.any_size, arguments.keep)
         except (AssertionError, subprocess.TimeoutExpired) as problem:
             print(f"{folder}: {problem}")
             good = False
