@@ -25,7 +25,15 @@ const STRETCHED: f64 = 10.0;
 const NARROW: f64 = 0.75;
 
 /// Every loop of a chart gets at least so many edges.
-const EDGES_PER_LOOP: f64 = 6.0;
+const EDGES_PER_LOOP: f64 = 8.0;
+
+/// A chart is so many elements wide at least, unless it is as wide as an edge is long.
+const ELEMENTS_ACROSS: f64 = 1.5;
+
+/// Charts of less than so many squares of the size get elements small enough for their whole boundary, inside, too, and half
+/// of the size where MeshAdapt makes them: it measures edges at their middles, and cuts off what sticks out (a third of a
+/// chart of lucy_100k of 21 squares).
+const SMALL: f64 = 60.0;
 
 /// And every curve along a narrow place at most about so many: a chart as long as the part and a thousandth as wide would
 /// have as many elements as all others together.
@@ -70,27 +78,61 @@ pub fn gmsh(
         tracing::warn!("hand-off to Gmsh: {warning}");
     }
     let algorithms = algorithms(&linear, conformal_p99, size);
-    let narrow = narrow(charts, network, size);
+    let narrow = narrow(charts, network, &algorithms.adapted, size);
     let report =
         HandOff { narrow_curves: narrow.iter().map(|n| n.curves.len()).sum(), ..counted(report, &linear, &algorithms) };
     HandedOff { files: files(mesh, charts, &linear, network, size, algorithms, narrow), report }
 }
 
-/// The curves along narrow places, by the size of elements there: half of `size`, a quarter, and so on.
-fn narrow(charts: &[Chart], network: &SeamNetwork, size: f64) -> Vec<gmsh::Narrow> {
-    let halved = |n: u32| gmsh::Narrow { size: size * 0.5_f64.powi(n as i32), curves: vec![], longest: 0.0 };
+/// The curves along narrow places and the small charts, by the size of elements there: half of `size`, a quarter, and so on.
+/// `adapted` are the charts that MeshAdapt makes.
+fn narrow(charts: &[Chart], network: &SeamNetwork, adapted: &[usize], size: f64) -> Vec<gmsh::Narrow> {
+    let halved = |n: u32| gmsh::Narrow { size: size * 0.5_f64.powi(n as i32), ..gmsh::Narrow::default() };
     let mut found: Vec<gmsh::Narrow> = (1..=gmsh::Narrow::HALVINGS).map(halved).collect();
+    let class = |wanted: f64| {
+        let halvings = (size / wanted).log2().round().clamp(1.0, f64::from(gmsh::Narrow::HALVINGS));
+        (wanted < NARROW * size).then_some(halvings as usize - 1)
+    };
     for (curve, wanted) in network.curves().iter().zip(wanted_sizes(charts, network)) {
-        let wanted = wanted.max(curve.length() / MOST_EDGES);
-        if wanted < NARROW * size {
-            let halvings = (size / wanted).log2().round().clamp(1.0, f64::from(gmsh::Narrow::HALVINGS));
-            let at = &mut found[halvings as usize - 1];
-            at.curves.push(curve.id().index());
-            at.longest = at.longest.max(curve.length());
+        if let Some(class) = class(wanted.max(curve.length() / MOST_EDGES)) {
+            found[class].curves.push(curve.id().index());
+            found[class].longest = found[class].longest.max(curve.length());
         }
     }
-    found.retain(|n| !n.curves.is_empty());
+    for chart in charts {
+        let Extent { area, perimeter } = Extent::of(chart, network);
+        if area > SMALL * size * size {
+            continue;
+        }
+        let is_adapted = adapted.contains(&chart.id().index());
+        let inside = if is_adapted { 0.5 * size } else { size };
+        if let Some(class) = class(inside.min(perimeter / EDGES_PER_LOOP)) {
+            found[class].surfaces.push(chart.id().index());
+        }
+    }
+    found.retain(|n| !n.curves.is_empty() || !n.surfaces.is_empty());
     found
+}
+
+/// How large a chart is, in the unit of the input.
+struct Extent {
+    area: f64,
+    perimeter: f64,
+}
+
+impl Extent {
+    fn of(chart: &Chart, network: &SeamNetwork) -> Self {
+        let length = |p: &Passage| network.curves()[p.curve.index()].length();
+        Self {
+            area: (0..chart.triangles().len()).map(|f| chart.area(f)).sum(),
+            perimeter: network.loops(chart.id()).iter().flatten().map(length).sum(),
+        }
+    }
+
+    /// The width of a strip of any length, the radius of a disk.
+    fn width(&self) -> f64 {
+        2.0 * self.area / self.perimeter
+    }
 }
 
 /// The largest size of elements along each curve that its charts can do with.
@@ -100,13 +142,9 @@ fn narrow(charts: &[Chart], network: &SeamNetwork, size: f64) -> Vec<gmsh::Narro
 fn wanted_sizes(charts: &[Chart], network: &SeamNetwork) -> Vec<f64> {
     let mut wanted: Vec<f64> = network.curves().iter().map(Curve::length).collect();
     for chart in charts {
-        let area: f64 = (0..chart.triangles().len()).map(|f| chart.area(f)).sum();
         let length = |turn: &Vec<Passage>| turn.iter().map(|p| network.curves()[p.curve.index()].length()).sum::<f64>();
-        let loops = network.loops(chart.id());
-        let perimeter: f64 = loops.iter().map(length).sum();
-        // That of a strip of any length; the radius of a disk.
-        let width = 2.0 * area / perimeter;
-        for turn in loops {
+        let width = Extent::of(chart, network).width() / ELEMENTS_ACROSS;
+        for turn in network.loops(chart.id()) {
             let size = width.min(length(turn) / EDGES_PER_LOOP);
             for passage in turn {
                 let known = &mut wanted[passage.curve.index()];

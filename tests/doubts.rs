@@ -61,6 +61,8 @@ fn a_cube_with_a_finer_top_is_closed() {
     let (counts, repairs) = (report.surface.expect("counted").repaired.counts, report.repairs.expect("told"));
     assert_eq!((counts.components, counts.boundary_loops, counts.euler), (1, 0, 2));
     assert_eq!((repairs.t_junctions_closed, repairs.t_junctions_left, repairs.triangles_added), (4, 0, 4));
+    let checked = crate::support::planish(["check".as_ref(), out.of("cube.stl").as_os_str()]);
+    assert_eq!(checked.code, Some(0), "{}", checked.err);
     let (_, open) = out.run_bytes("open.stl", &stl(&cube_with_finer_top(1e-4)));
     assert_eq!(open.surface.expect("counted").repaired.counts.boundary_loops, 2);
 }

@@ -29,6 +29,8 @@ pub struct Narrow {
     pub size: f64,
     /// The curves, counted from 0.
     pub curves: Vec<usize>,
+    /// Surfaces that have elements of this size all over, counted from 0.
+    pub surfaces: Vec<usize>,
     /// The length of the longest of them.
     pub longest: f64,
 }
@@ -41,7 +43,7 @@ impl Narrow {
     const MOST_SAMPLES: f64 = 500.0;
 
     /// How much larger elements may become over a distance.
-    const GRADATION: f64 = 0.5;
+    const GRADATION: f64 = 0.4;
 }
 
 /// The algorithms that the script asks for.
@@ -146,32 +148,52 @@ fn fields(narrow: &[Narrow], factor: f64) -> String {
 // Smaller elements around curves that are shorter than an edge, or bound charts that are narrower.
 ",
     );
-    for (i, place) in narrow.iter().enumerate() {
-        let (distance, threshold) = (2 * i + 1, 2 * i + 2);
-        let (size, gradation) = (place.size, Narrow::GRADATION);
-        let samples = (place.longest / size).ceil().clamp(10.0, Narrow::MOST_SAMPLES);
-        text += &format!(
-            "Field[{distance}] = Distance;
+    let mut fields = Vec::new();
+    let mut last = 0;
+    for place in narrow {
+        let size = place.size;
+        let smaller = format!("(size < {size} ? size : {size}) * {factor}");
+        if !place.curves.is_empty() {
+            let (distance, threshold) = (last + 1, last + 2);
+            let samples = (place.longest / size).ceil().clamp(10.0, Narrow::MOST_SAMPLES);
+            text += &format!(
+                "Field[{distance}] = Distance;
 Field[{distance}].CurvesList = {{{curves}}};
 Field[{distance}].Sampling = {samples};
 Field[{threshold}] = Threshold;
 Field[{threshold}].InField = {distance};
-Field[{threshold}].SizeMin = (size < {size} ? size : {size}) * {factor};
+Field[{threshold}].SizeMin = {smaller};
 Field[{threshold}].SizeMax = size * {factor};
 Field[{threshold}].DistMin = {size} * {factor};
 Field[{threshold}].DistMax = (size < {size} ? {size} : size) / {gradation} * {factor};
 ",
-            curves = tags(&place.curves),
-        );
+                curves = tags(&place.curves),
+                gradation = Narrow::GRADATION,
+            );
+            fields.push(last + 1);
+            last = threshold;
+        }
+        if !place.surfaces.is_empty() {
+            last += 1;
+            text += &format!(
+                "Field[{last}] = Constant;
+Field[{last}].SurfacesList = {{{surfaces}}};
+Field[{last}].IncludeBoundary = 1;
+Field[{last}].VIn = {smaller};
+Field[{last}].VOut = size * {factor};
+",
+                surfaces = tags(&place.surfaces),
+            );
+            fields.push(last - 1);
+        }
     }
-    let all = 2 * narrow.len() + 1;
-    let thresholds: Vec<usize> = (0..narrow.len()).map(|i| 2 * i + 1).collect();
+    let all = last + 1;
     text + &format!(
         "Field[{all}] = Min;
 Field[{all}].FieldsList = {{{}}};
 Background Field = {all};
 ",
-        tags(&thresholds)
+        tags(&fields)
     )
 }
 
@@ -208,16 +230,17 @@ mod tests {
 
     #[test]
     fn narrow_places_have_fields_of_their_own() {
-        let place = |size, curves| Narrow { size, curves, longest: 1.0 };
+        let place = |size, curves| Narrow { size, curves, surfaces: vec![4], longest: 1.0 };
         let algorithms = Algorithms { adapted: vec![], enlarged: 4.0 };
         let text = script(algorithms, vec![place(0.15, vec![0, 6]), place(0.075, vec![2])]);
         for line in [
             "Mesh.MeshSizeMin = 1 / 1024 * size * 4;",
             "Field[1].CurvesList = {1, 7};",
-            "Field[3].CurvesList = {3};",
-            "Field[4].SizeMin = (size < 0.075 ? size : 0.075) * 4;",
-            "Field[5].FieldsList = {2, 4};",
-            "Background Field = 5;",
+            "Field[3].SurfacesList = {5};",
+            "Field[4].CurvesList = {3};",
+            "Field[5].SizeMin = (size < 0.075 ? size : 0.075) * 4;",
+            "Field[7].FieldsList = {2, 3, 5, 6};",
+            "Background Field = 7;",
         ] {
             assert!(text.contains(line), "{line} is not in\n{text}");
         }
