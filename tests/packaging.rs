@@ -50,7 +50,7 @@ fn the_example_works_as_it_is_and_switched_on_and_shows_the_defaults() {
         ..as_it_is
     };
     assert_eq!(all, without_default);
-    assert_eq!(all.on_certified.len(), 1);
+    assert_eq!(all.on_certified.len(), 2);
     let out = Out::new();
     let config = root().join("packaging/planish.toml");
     let ended = out.run(&[&fixture("disk.stl")], &["--config", config.to_str().expect("UTF-8")]);

@@ -1,14 +1,14 @@
 //! Soundness: does a mesh that was made through the maps represent the certified surface, and are its elements good?
 //!
 //! *Faithful*: nothing is lost, doubled, folded or torn. Where the file tells in which chart each triangle was made, this
-//! is shown chart by chart, in the map that the mesher used: every triangle is positive ([`mod@covering`]), the open edges
-//! of the chart's mesh run along its curves, each of them whole ([`mod@curves`]), and the loops that they form are simple
-//! and rightly nested ([`mod@loops`]), so that the chart is covered once. Whether the file tells charts or not, the mesh has
-//! the invariants of the surface ([`mod@topology`]), its nodes lie on the surface, no part of the surface is farther from it
+//! is shown chart by chart, in the map that the mesher used: every triangle is positive (`covering`), the open edges
+//! of the chart's mesh run along its curves, each of them whole (`curves`), and the loops that they form are simple
+//! and rightly nested (`loops`), so that the chart is covered once. Whether the file tells charts or not, the mesh has
+//! the invariants of the surface (`topology`), its nodes lie on the surface, no part of the surface is farther from it
 //! than little more than an edge, its area is that of the surface but for what flat elements cut off, and no two triangles
-//! cross that do not in the surface ([`mod@intersect`]). Elements of six nodes are valid.
+//! cross that do not in the surface (`intersect`). Elements of six nodes are valid.
 //!
-//! *Fine*: no element has a gamma below the least one asked for, but for those in tips of the surface ([`mod@elements`]).
+//! *Fine*: no element has a gamma below the least one asked for, but for those in tips of the surface (`elements`).
 //!
 //! What is decided exactly is decided on the grid, from places that are found in doubles: the verdict is one on the mesh
 //! with its nodes moved by rounding. Distances are measured at nodes and at points of a lattice. Nothing is assumed of
