@@ -271,17 +271,17 @@ pub fn assemble(
     report.decomposition.iter_mut().for_each(|d| d.charts_by_splitting = charts.len() - whole);
     let network = SeamNetwork::new(mesh, &charts);
     let fields: Vec<_> = charts.iter().zip(&done).map(|(c, d)| distortion::fields(c, &d.certified)).collect();
-    let mut conformal_p99 = Vec::with_capacity(charts.len());
+    let mut distortions = Vec::with_capacity(charts.len());
     for ((chart, done), fields) in charts.iter().zip(&done).zip(&fields) {
         warn_if_unsolved(chart, done);
         let summary = distortion::summary(chart, &done.certified, fields);
-        conformal_p99.push(summary.conformal_p99);
         report.charts.push(report::chart_report(chart, &network, done, fields, &summary));
+        distortions.push(summary);
     }
     report.seams = report::seams(&network);
     let mut files = encode(mesh, &charts, &done, &fields, &network)?;
     if settings.hand_off == settings::HandOff::Gmsh {
-        let handed = hand_off::gmsh(mesh, &charts, &done, &conformal_p99, &network, settings.size);
+        let handed = hand_off::gmsh(mesh, &charts, &done, &distortions, &network, settings.size);
         files.extend(handed.files);
         report.hand_off = Some(handed.report);
     }

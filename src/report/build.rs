@@ -59,6 +59,7 @@ pub fn repairs(report: &repair::Report) -> Repairs {
         t_junctions_closed: report.t_junctions_closed.count,
         t_junctions_left: report.t_junctions_left.count,
         triangles_added: report.triangles_added,
+        slits_opened: report.slits_opened,
         cracks_closed: report.cracks_closed,
         duplicate_triangles: report.duplicate_triangles.count,
         degenerate_triangles: report.degenerate_triangles.count,

@@ -182,6 +182,9 @@ pub struct Repairs {
     /// Triangles of the surface beyond one for each of the input: parts of those that were split.
     #[serde(default)]
     pub triangles_added: usize,
+    /// Single edges along which sheets meet inside a sheet, halved so that they can be seams.
+    #[serde(default)]
+    pub slits_opened: usize,
     /// Pairs of open edges joined.
     pub cracks_closed: usize,
     /// Copies of a triangle, removed.

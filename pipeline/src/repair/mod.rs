@@ -21,7 +21,7 @@ mod weld;
 
 use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::{Census, EdgeTable, Metric, SurfaceMesh, TriangleSoup, Umbrellas};
-use crate::space::{BoundingBox, Vec3, unit_scale};
+use crate::space::{BoundingBox, Vec3, midpoint, unit_scale};
 use t_junctions::Boundary;
 
 /// What repair may do.
@@ -86,6 +86,8 @@ pub struct Report {
     pub degenerate_triangles: Found,
     /// Triangles turned over.
     pub flipped_triangles: Found,
+    /// Single edges along which sheets meet inside a sheet, halved so that they can be seams.
+    pub slits_opened: usize,
     /// Vertices (after welding) that were given to several sheets.
     pub split_vertices: Found,
     /// What was added to every intrinsic edge length, in the unit of the input.
@@ -207,9 +209,13 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
         report.flipped_triangles = draft.orient(&edges);
         edges = renewed(edges, report.flipped_triangles.count > 0, &draft.triangles);
     }
-    report.triangles_added = if split { draft.count_added() } else { 0 };
-    let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0);
-    let mesh = draft.into_mesh(edges, known, &mut report);
+    let input_points = draft.points.len();
+    report.slits_opened = draft.open_slits(&edges);
+    let opened = report.slits_opened > 0;
+    edges = renewed(edges, opened, &draft.triangles);
+    report.triangles_added = if split || opened { draft.count_added() } else { 0 };
+    let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0 && !opened);
+    let mesh = draft.into_mesh(edges, input_points, known, &mut report);
     // As read: vertices of degenerate triangles count, though these do not.
     Ok(Repaired { mesh, raw: Census { vertices: used, ..raw }, report })
 }
@@ -286,6 +292,45 @@ impl Draft {
         Found::of(closed.into_iter().map(|v| v.0))
     }
 
+    /// Halves the non-manifold edges along which two triangles would stay neighbours after the split; returns how many.
+    ///
+    /// Where a single edge of a sheet meets others, both its ends lie inside the sheet, and the split would leave two edges
+    /// between the same two vertices: one edge again. With a vertex in its middle, which the two sides have one each of,
+    /// there are four, and the slit is a seam as it must be.
+    fn open_slits(&mut self, edges: &EdgeTable) -> usize {
+        let meets = |sides: &[HalfEdgeId]| sides.len() > 2;
+        if !edges.iter().any(|(_, sides)| meets(sides)) {
+            return 0;
+        }
+        let umbrellas = Umbrellas::new(&self.triangles, edges);
+        let ends = |h: &HalfEdgeId| {
+            let [a, b] = [h.index(), h.next().index()].map(|corner| umbrellas.of_corner[corner]);
+            [a.min(b), a.max(b)]
+        };
+        let rejoined = |sides: &[HalfEdgeId]| {
+            let mut all: Vec<[u32; 2]> = sides.iter().map(ends).collect();
+            all.sort_unstable();
+            all.windows(2).any(|w| w[0] == w[1])
+        };
+        let mut cut: Vec<(HalfEdgeId, VertexId)> = Vec::new();
+        let mut opened = 0;
+        for (_, sides) in edges.iter().filter(|(_, sides)| meets(sides) && rejoined(sides)) {
+            let t = self.triangles[sides[0].face().index()];
+            let [a, b] = [t[sides[0].side()], t[(sides[0].side() + 1) % 3]];
+            let middle = VertexId::at(self.points.len());
+            self.points.push(midpoint(self.points[a.index()], self.points[b.index()]));
+            cut.extend(sides.iter().map(|h| (*h, middle)));
+            opened += 1;
+        }
+        cut.sort_unstable();
+        for of_face in cut.chunk_by(|g, h| g.0.face() == h.0.face()) {
+            let mut on_sides = [const { Vec::new() }; 3];
+            of_face.iter().for_each(|(h, middle)| on_sides[h.side()].push(*middle));
+            self.split(of_face[0].0.face().index(), &on_sides);
+        }
+        opened
+    }
+
     /// Puts the parts of a triangle at its place and at the end.
     fn split(&mut self, face: usize, on_sides: &[Vec<VertexId>; 3]) {
         let parts = t_junctions::parts(self.triangles[face], on_sides);
@@ -339,8 +384,14 @@ impl Draft {
     }
 
     /// Gives every umbrella a vertex of its own, drops unused points, and measures. The triangles may have been counted
-    /// before.
-    fn into_mesh(self, edges: EdgeTable, known: Option<&Census>, report: &mut Report) -> SurfaceMesh {
+    /// before. Points from `input_points` on are not of the input.
+    fn into_mesh(
+        self,
+        edges: EdgeTable,
+        input_points: usize,
+        known: Option<&Census>,
+        report: &mut Report,
+    ) -> SurfaceMesh {
         let umbrellas = Umbrellas::new(&self.triangles, &edges);
         let (of_umbrella, welded) = split_vertices(&umbrellas.vertices(&self.triangles), report);
         let renamed = |face: usize| [0, 1, 2].map(|k| of_umbrella[umbrellas.of_corner[3 * face + k] as usize]);
@@ -359,7 +410,7 @@ impl Draft {
         let known = known.filter(|_| report.split_vertices.count == 0).cloned();
         let census = known.unwrap_or_else(|| Census::new(&triangles, &edges));
         let census = Census { nonmanifold_edges, nonmanifold_vertices, ..census };
-        let added_from = points.len();
+        let added_from = welded.partition_point(|w| (*w as usize) < input_points);
         SurfaceMesh { points, triangles, source: self.source, welded, added_from, edges, census, metric }
     }
 }

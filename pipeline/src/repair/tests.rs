@@ -359,3 +359,26 @@ fn faces_of_volume_elements_are_refused_and_a_few_sheets_are_not() {
         assert_eq!(repaired(&few).check_sheets(), Ok(()));
     }
 }
+
+#[test]
+fn a_single_edge_on_which_another_sheet_stands_becomes_a_slit() {
+    // A fan of six triangles around two inner vertices; a fin stands on the edge between these.
+    let mut points: Vec<Vec3> = vec![[0.0; 3], [1.0, 0.0, 0.0]];
+    let rim = [[-1.0, -1.0], [0.5, -1.0], [2.0, -1.0], [2.0, 1.0], [0.5, 1.0], [-1.0, 1.0]];
+    points.extend(rim.map(|[x, y]| [x, y, 0.0]));
+    points.push([0.5, 0.0, 1.0]);
+    let sheet = [[0, 2, 3], [0, 3, 1], [1, 3, 4], [1, 4, 5], [1, 5, 6], [1, 6, 0], [0, 6, 7], [0, 7, 2]];
+    let triangles: Vec<[u32; 3]> = sheet.into_iter().chain([[0, 1, 8]]).collect();
+    let got = repaired(&TriangleSoup::new(points, triangles).expect("sound"));
+    assert_eq!((got.report.slits_opened, got.report.triangles_added), (1, 3));
+    // The slit is a hole of the sheet, along which the fin stands; all three have vertices of their own.
+    let census = got.mesh.census();
+    assert_eq!((census.components, census.boundary_loops, census.nonmanifold_edges), (2, 3, 2));
+    let added: Vec<VertexId> =
+        (0..got.mesh.points().len()).map(VertexId::at).filter(|v| got.mesh.input_vertex(*v).is_none()).collect();
+    assert_eq!(added.len(), 3, "one for each side of the slit, one for the fin");
+    assert!(added.iter().all(|v| got.mesh.points()[v.index()] == [0.5, 0.0, 0.0]));
+    // Two edges or more need no help: the vertex between them is there already.
+    let book = repaired(&crate::shapes::book(3, 4));
+    assert_eq!(book.report.slits_opened, 0);
+}
