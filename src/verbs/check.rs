@@ -151,7 +151,7 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
     missing.chain(damaged).collect()
 }
 
-pub(super) fn read_grid(folder: &Path, name: &str) -> Result<Grid, Finding> {
+fn read_grid(folder: &Path, name: &str) -> Result<Grid, Finding> {
     vtu::read(&read(folder, name)?).map_err(|e| file(name, e))
 }
 

@@ -3,10 +3,10 @@
 //! The surface is read from surface.vtu, the maps that the mesher used from atlas.msh: both must be what was published.
 //! What is found is told, and kept as mesh.json beside the report.
 
-use super::check::{folder, read, read_grid, read_report};
+use super::check::{folder, read, read_report};
 use super::{Exit, complain, say, say_json, shown};
 use crate::formats::gmsh;
-use crate::formats::vtu::Grid;
+use crate::formats::vtu::{self, Grid};
 use crate::formats::{self, Kind, Nothing, Patches, READ, Source};
 use crate::outcome::Reason;
 use crate::report::mesh::{MeshReport, PLACES};
@@ -117,7 +117,7 @@ fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<Mesh
 /// The surface of a result, as it was published.
 fn surface(folder: &Path, report: &Report) -> Result<(Output, Grid), Unjudged> {
     let bytes = published(folder, report, "surface.vtu")?.ok_or(Unjudged::Changed("surface.vtu"))?;
-    let grid = read_grid(folder, "surface.vtu").map_err(|e| Unjudged::Told(e.to_string()))?;
+    let grid = vtu::read(&bytes).map_err(|e| Unjudged::Told(format!("surface.vtu: {e}")))?;
     Ok((Output::of("surface.vtu", &bytes), grid))
 }
 

@@ -17,6 +17,7 @@ pub use closest::{OnTriangle, on_segment, on_triangle};
 pub use plane::Plane;
 
 use crate::space::{BoundingBox, Vec3};
+use std::sync::OnceLock;
 
 /// A triangulation in space and in the plane, searched by either.
 #[derive(Clone, Debug)]
@@ -25,7 +26,8 @@ pub struct LinearMap {
     uv: Vec<[f64; 2]>,
     triangles: Vec<[u32; 3]>,
     in_space: Bvh,
-    in_plane: Bvh,
+    /// Made when it is first asked for.
+    in_plane: OnceLock<Bvh>,
 }
 
 /// A point of a triangulation.
@@ -47,9 +49,7 @@ impl LinearMap {
     pub fn new(points: Vec<Vec3>, uv: Vec<[f64; 2]>, triangles: Vec<[u32; 3]>) -> Self {
         assert_eq!(points.len(), uv.len(), "every node has both places");
         let in_space = triangle_bvh(&points, &triangles);
-        let flat: Vec<Vec3> = uv.iter().copied().map(lifted).collect();
-        let in_plane = triangle_bvh(&flat, &triangles);
-        Self { points, uv, triangles, in_space, in_plane }
+        Self { points, uv, triangles, in_space, in_plane: OnceLock::new() }
     }
 
     /// The places of the nodes in space.
@@ -76,7 +76,11 @@ impl LinearMap {
     /// only where there is no triangle.
     pub fn to_space(&self, uv: [f64; 2]) -> Option<Located> {
         let corners = |f: u32| self.triangles[f as usize].map(|n| lifted(self.uv[n as usize]));
-        nearest(&self.in_plane, lifted(uv), f64::INFINITY, corners)
+        let in_plane = self.in_plane.get_or_init(|| {
+            let flat: Vec<Vec3> = self.uv.iter().copied().map(lifted).collect();
+            triangle_bvh(&flat, &self.triangles)
+        });
+        nearest(in_plane, lifted(uv), f64::INFINITY, corners)
     }
 
     /// Where a point lies in the plane.

@@ -6,7 +6,7 @@ use crate::id::VertexId;
 use crate::space::Vec3;
 
 /// So many points of the surface are compared with the mesh at most.
-const SAMPLES: f64 = 20_000.0;
+const SAMPLES: f64 = 15_000.0;
 
 /// A distance and where it was found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -68,9 +68,15 @@ pub(super) fn to_surface(x: Vec3, surface: &Triangulation, tree: &Bvh) -> f64 {
 }
 
 /// The point of the surface that is farthest from the mesh, and how many of the points looked at are farther than `limit`:
-/// points on a lattice in every triangle, half of `size` apart where that is not too many.
-pub(super) fn uncovered(surface: &Triangulation, mesh: &Triangulation, size: f64, limit: f64) -> (Farthest, usize) {
-    let tree = mesh.bvh();
+/// its vertices, as tips are what is lost first, and points on a lattice in every triangle, half of `size` apart where that
+/// is not too many. `tree` has the triangles of the mesh.
+pub(super) fn uncovered(
+    surface: &Triangulation,
+    mesh: &Triangulation,
+    tree: &Bvh,
+    size: f64,
+    limit: f64,
+) -> (Farthest, usize) {
     // Along each triangle, so many that together they are not too many.
     let wanted = |t: usize, spacing: f64| (surface.area_of(t).sqrt() / spacing).ceil().clamp(1.0, 200.0);
     let count = |spacing: f64| (0..surface.triangles.len()).map(|t| wanted(t, spacing).powi(2)).sum::<f64>();
@@ -79,13 +85,20 @@ pub(super) fn uncovered(surface: &Triangulation, mesh: &Triangulation, size: f64
     let spacing = dense * excess;
     let stride = (surface.triangles.len() as f64 / SAMPLES).ceil().max(1.0) as usize;
     let (mut far, mut beyond) = (Farthest::default(), 0);
+    let mut look = |x: Vec3| {
+        let d = to_surface(x, mesh, tree);
+        far.grow(d, x);
+        beyond += usize::from(d > limit);
+    };
+    let mut used = vec![false; surface.points.len()];
+    surface.triangles.iter().flatten().for_each(|v| used[v.index()] = true);
+    let vertices = surface.points.iter().zip(&used).filter(|(_, used)| **used).map(|(p, _)| *p);
+    vertices.step_by(stride).for_each(&mut look);
     for t in (0..surface.triangles.len()).step_by(stride) {
         let corners = surface.corners(t);
         for weights in lattice(wanted(t, spacing) as u32) {
             let x = [0, 1, 2].map(|k| (0..3).map(|i| weights[i] * corners[i][k]).sum());
-            let d = to_surface(x, mesh, &tree);
-            far.grow(d, x);
-            beyond += usize::from(d > limit);
+            look(x);
         }
     }
     (far, beyond)
@@ -123,13 +136,23 @@ mod tests {
     }
 
     #[test]
+    fn the_tip_of_a_needle_is_looked_at() {
+        // A facet 100 times as long as wide: no point of a coarse lattice is near its tip.
+        let needle = [[0.0; 3], [0.0, 1.0, 0.0], [100.0, 0.5, 0.0]];
+        let blunt = [needle[0], needle[1], [90.0, 0.5, 0.0]];
+        let [surface, mesh] = [needle, blunt].map(|p| Triangulation::welded(&p, [[0, 1, 2]]));
+        let (far, beyond) = uncovered(&surface, &mesh, &mesh.bvh(), 5.0, 6.0);
+        assert!(beyond > 0 && (far.distance - 10.0).abs() < 0.1, "{far:?}");
+    }
+
+    #[test]
     fn a_lost_corner_is_seen() {
         let soup = crate::shapes::flat_disk(8);
         let surface = Triangulation::welded(soup.points(), soup.triangles().iter().copied());
         let right = |t: &&[u32; 3]| t.iter().any(|i| soup.points()[*i as usize][0] <= 0.5);
         let part = Triangulation::welded(soup.points(), soup.triangles().iter().filter(right).copied());
-        let (far, beyond) = uncovered(&surface, &part, 0.1, 0.2);
+        let (far, beyond) = uncovered(&surface, &part, &part.bvh(), 0.1, 0.2);
         assert!(far.at[0] > 0.5 && far.distance > 0.2 && beyond > 0, "{far:?}");
-        assert_eq!(uncovered(&surface, &surface, 0.1, 0.2).1, 0);
+        assert_eq!(uncovered(&surface, &surface, &surface.bvh(), 0.1, 0.2).1, 0);
     }
 }

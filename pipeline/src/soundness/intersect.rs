@@ -29,14 +29,19 @@ pub struct Crossings {
 
 /// Finds the pairs of triangles of `mesh` that cross where no triangles of `surface` cross or come closer than `contact`:
 /// where parts of an assembly touch, flat elements of both sides cross however small they are.
-pub fn crossings(mesh: &Triangulation, surface: &Triangulation, surface_bvh: &Bvh, contact: f64) -> Crossings {
+/// `tree` has the triangles of the mesh.
+pub fn crossings(mesh: &Triangulation, tree: &Bvh, surface: &Triangulation, contact: f64) -> Crossings {
     let mut pairs = Vec::new();
-    mesh.bvh().pairs(|a, b| {
+    tree.pairs(|a, b| {
         if cross_each_other(mesh, a, b) {
             pairs.push([a, b]);
         }
     });
     let mut found = Crossings::default();
+    if pairs.is_empty() {
+        return found;
+    }
+    let surface_bvh = &surface.bvh();
     for (i, pair) in pairs.into_iter().enumerate() {
         // Beyond the bound a crossing counts: it is the mesh that is suspect.
         if i < LOOKED_AT && surface_crosses(mesh, pair, surface, surface_bvh, contact) {
@@ -125,12 +130,16 @@ mod tests {
         Triangulation::welded(&points, (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]))
     }
 
+    fn found(mesh: &Triangulation, surface: &Triangulation, contact: f64) -> Crossings {
+        crossings(mesh, &mesh.bvh(), surface, contact)
+    }
+
     const FLAT: [Vec3; 3] = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
 
     #[test]
     fn what_passes_through_crosses_and_what_touches_does_not() {
         let none = mesh(&[]);
-        let count = |other: [Vec3; 3]| crossings(&mesh(&[FLAT, other]), &none, &none.bvh(), 0.0).pairs.len();
+        let count = |other: [Vec3; 3]| found(&mesh(&[FLAT, other]), &none, 0.0).pairs.len();
         assert_eq!(count([[0.5, 0.5, -1.0], [0.5, 0.5, 1.0], [5.0, 5.0, 0.0]]), 1);
         assert_eq!(count([[0.0; 3], [0.9, 0.6, -1.0], [0.6, 0.9, 1.0]]), 1, "through a shared node");
         assert_eq!(count([[0.0; 3], [-0.5, -0.5, -1.0], [-0.6, -0.9, 1.0]]), 0);
@@ -143,12 +152,12 @@ mod tests {
     fn what_the_surface_has_is_not_held_against_the_mesh() {
         let through = [[0.5, 0.5, -1.0], [0.5, 0.5, 1.0], [5.0, 5.0, 0.0]];
         let both = mesh(&[FLAT, through]);
-        let found = crossings(&both, &both, &both.bvh(), 0.0);
-        assert_eq!((found.pairs.len(), found.in_surface), (0, 1));
+        let itself = found(&both, &both, 0.0);
+        assert_eq!((itself.pairs.len(), itself.in_surface), (0, 1));
         // Parts that touch: a corner on a triangle.
         let touching = mesh(&[FLAT, [[0.5, 0.5, 0.0], [0.5, 0.6, 1.0], [5.0, 5.0, 0.5]]]);
-        assert_eq!(crossings(&both, &touching, &touching.bvh(), 1e-9).pairs.len(), 0);
+        assert_eq!(found(&both, &touching, 1e-9).pairs.len(), 0);
         let apart = mesh(&[FLAT, [[0.5, 0.5, 0.1], [0.5, 0.6, 1.0], [5.0, 5.0, 0.5]]]);
-        assert_eq!(crossings(&both, &apart, &apart.bvh(), 1e-9).pairs.len(), 1);
+        assert_eq!(found(&both, &apart, 1e-9).pairs.len(), 1);
     }
 }

@@ -317,7 +317,6 @@ pub fn examine(
 ) -> Findings {
     let triangulation = &mesh.triangulation;
     let diagonal = surface.diagonal();
-    let surface_bvh = surface.bvh();
     let mut defects: Vec<Defect> = degenerate(triangulation).into_iter().collect();
     if defects.is_empty() {
         let edges = EdgeTable::new(&triangulation.triangles);
@@ -327,7 +326,7 @@ pub fn examine(
     let atlas = atlas.zip(mesh.charts.as_ref());
     let distance = match atlas {
         Some((atlas, labels)) => by_charts(mesh, labels, atlas, diagonal, &mut defects),
-        None => SurfaceDistance::measure(triangulation, surface, &surface_bvh),
+        None => SurfaceDistance::measure(triangulation, surface, &surface.bvh()),
     };
     let limit = settings.off_surface * diagonal;
     let (mesh_to_surface, nodes) = distance.farthest(&triangulation.points, limit);
@@ -336,14 +335,15 @@ pub fn examine(
         defects.push(Defect::OffSurface { nodes, distance, limit, at });
     }
     let limit = LOST * settings.size;
-    let (surface_to_mesh, lost) = uncovered(surface, triangulation, settings.size, limit);
+    let tree = triangulation.bvh();
+    let (surface_to_mesh, lost) = uncovered(surface, triangulation, &tree, settings.size, limit);
     if lost > 0 {
         let Farthest { distance, at } = surface_to_mesh;
         defects.push(Defect::Lost { distance, limit, at });
     }
     let area_ratio = triangulation.area() / surface.area();
     defects.extend(area_defects(mesh, surface, charts, area_ratio, settings.size));
-    let crossings = intersect::crossings(triangulation, surface, &surface_bvh, settings.off_surface * diagonal);
+    let crossings = intersect::crossings(triangulation, &tree, surface, settings.off_surface * diagonal);
     let at = |t: u32| centroid(triangulation.corners(t as usize));
     defects.extend(crossings.pairs.first().map(|p| Defect::Crossing { pairs: crossings.pairs.len(), at: at(p[0]) }));
     let inverted = elements::invalid_curved(mesh);

@@ -35,10 +35,9 @@ pub fn read(bytes: &[u8]) -> Result<HandedOverAtlas, AtlasError> {
     if !bytes.starts_with(HEAD) {
         return Err(AtlasError::Format);
     }
-    let bounding = Section::find(bytes, "Entities", HEAD.len())?.entities()?;
-    // It is the last section: what comes before may hold any bytes, also those that begin a section.
-    let parametrizations = Section::find_last(bytes, "Parametrizations")?;
-    parametrizations.charts(bounding)
+    let mut entities = Section::find(bytes, "Entities", HEAD.len())?;
+    let bounding = entities.entities()?;
+    Section::find_after(bytes, "Parametrizations", entities.at)?.charts(bounding)
 }
 
 /// A section of the file, as far as it was read.
@@ -56,12 +55,14 @@ impl<'a> Section<'a> {
         if begins { Ok(Self { bytes, at: at + head.len(), name }) } else { Err(AtlasError::NoSection(name)) }
     }
 
-    /// The section whose name comes last in the file, looked for from its end.
-    fn find_last(bytes: &'a [u8], name: &'static str) -> Result<Self, AtlasError> {
+    /// The first section of this name after `at`. Nodes and elements before it are numbers that spell no name.
+    fn find_after(bytes: &'a [u8], name: &'static str, at: usize) -> Result<Self, AtlasError> {
         let head = format!("\n${name}\n");
-        let found = bytes.windows(head.len()).rposition(|w| w == head.as_bytes());
-        let at = found.ok_or(AtlasError::NoSection(name))?;
-        Ok(Self { bytes, at: at + head.len(), name })
+        let rest = &bytes[at..];
+        let dollars = rest.iter().enumerate().filter(|(_, b)| **b == b'$').map(|(i, _)| i);
+        let mut begins = dollars.filter_map(|i| i.checked_sub(1)).filter(|i| rest[*i..].starts_with(head.as_bytes()));
+        let found = begins.next().ok_or(AtlasError::NoSection(name))?;
+        Ok(Self { bytes, at: at + found + head.len(), name })
     }
 
     fn damaged(&self) -> AtlasError {
@@ -101,7 +102,7 @@ impl<'a> Section<'a> {
     }
 
     /// Per surface the curves that bound it.
-    fn entities(mut self) -> Result<Vec<Vec<u32>>, AtlasError> {
+    fn entities(&mut self) -> Result<Vec<Vec<u32>>, AtlasError> {
         let (points, curves, surfaces, _) = (self.count(1)?, self.count(1)?, self.count(1)?, self.count(1)?);
         for _ in 0..points {
             self.skip(4 + 24 + 8)?;
