@@ -14,9 +14,10 @@ use crate::space::{BoundingBox, Vec3, cross, dot, sub};
 /// The error of the volume of six doubles, relative to the sum of the absolute values of its terms.
 const ROUNDING: f64 = 8e-16;
 
-/// A surface is looked at around so many crossings of a mesh at most, and in so many triangles around each.
-const LOOKED_AT: usize = 2_000;
-const NEIGHBOURS: usize = 400;
+/// So many pairs of triangles of the surface are looked at in all: two seconds at most. Where a mesh crosses itself more often
+/// than that lets be explained, it is the mesh that is suspect. (The eight thousand crossings of pins_instanced, where pins fill
+/// their holes, need three million.)
+const LOOKS: usize = 20_000_000;
 
 /// Crossings of a mesh that its surface does not have.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,9 +43,9 @@ pub fn crossings(mesh: &Triangulation, tree: &Bvh, surface: &Triangulation, cont
         return found;
     }
     let surface_bvh = &surface.bvh();
-    for (i, pair) in pairs.into_iter().enumerate() {
-        // Beyond the bound a crossing counts: it is the mesh that is suspect.
-        if i < LOOKED_AT && surface_crosses(mesh, pair, surface, surface_bvh, contact) {
+    let mut looks = LOOKS;
+    for pair in pairs {
+        if surface_crosses(mesh, pair, surface, surface_bvh, contact, &mut looks) {
             found.in_surface += 1;
         } else {
             found.pairs.push(pair);
@@ -53,17 +54,31 @@ pub fn crossings(mesh: &Triangulation, tree: &Bvh, surface: &Triangulation, cont
     found
 }
 
-/// Whether triangles of the surface cross or touch within the boxes of two crossing triangles of the mesh.
-fn surface_crosses(mesh: &Triangulation, pair: [u32; 2], surface: &Triangulation, bvh: &Bvh, contact: f64) -> bool {
+/// Whether triangles of the surface cross or touch within the boxes of two crossing triangles of the mesh, as far as the
+/// looks that are left can tell.
+fn surface_crosses(
+    mesh: &Triangulation,
+    pair: [u32; 2],
+    surface: &Triangulation,
+    bvh: &Bvh,
+    contact: f64,
+    looks: &mut usize,
+) -> bool {
     let near = pair.map(|t| {
         let mut near = Vec::new();
         let around = BoundingBox::of(mesh.corners(t as usize));
         around.iter().for_each(|b| bvh.overlapping(b, |s| near.push(s)));
-        near.truncate(NEIGHBOURS);
         near
     });
-    let meet = |s: u32, t: u32| cross_each_other(surface, s, t) || touch(surface, s, t, contact);
-    near[0].iter().any(|s| near[1].iter().any(|t| s != t && meet(*s, *t)))
+    let all = near[0].iter().flat_map(|s| near[1].iter().map(move |t| (*s, *t)));
+    for (s, t) in all {
+        let Some(left) = looks.checked_sub(1) else { return false };
+        *looks = left;
+        if s != t && (cross_each_other(surface, s, t) || touch(surface, s, t, contact)) {
+            return true;
+        }
+    }
+    false
 }
 
 /// Whether two triangles that share no vertex have corners or sides that are closer than `contact` to each other.
