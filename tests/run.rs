@@ -226,7 +226,10 @@ fn order_1_writes_the_same_files_with_straight_triangles() {
     assert_eq!(out.run(&[&fixture("disk_with_holes.stl")], &["--order", "1"]).code, Some(0));
     let report = out.report("disk_with_holes.stl");
     let files: Vec<_> = report.outputs.iter().map(|o| o.file.as_str()).collect();
-    assert_eq!((files, report.settings.order), (ALL_FILES.to_vec(), 1));
+    // Its map stretches, and its edges are shorter than 1: Gmsh gets the atlas in a larger unit, too.
+    let expected = [&ALL_FILES[..], &["atlas-enlarged.msh"]].concat();
+    assert_eq!((files, report.settings.order), (expected, 1));
+    assert!(report.hand_off.is_some_and(|h| h.enlarged > 1.0 && h.adapted_charts == [0]));
     let chart = &report.charts[0];
     assert_eq!((&chart.quadratic, &chart.untangle, chart.certificate.by_exact), (&None, &None, 0));
     let grid = planish::formats::vtu::read(&out.read("disk_with_holes.stl", "surface.vtu")).expect("readable");
@@ -260,6 +263,13 @@ fn the_hand_off_can_be_left_out_and_its_size_chosen() {
     std::fs::remove_file(out.of("disk.stl").join("remesh.geo")).expect("removed");
     let ended = planish(["check".as_ref(), out.of("disk.stl").as_os_str()]);
     assert!(ended.code == Some(1) && ended.err.contains("remesh.geo"), "{}", ended.err);
+    // Nor is one whose script merges a file that is not listed.
+    out.run(&[&disk], &["--force"]);
+    let mut report = out.report("disk.stl");
+    report.hand_off.iter_mut().for_each(|h| h.enlarged = 8.0);
+    std::fs::write(out.of("disk.stl").join("report.json"), report.to_json().expect("JSON")).expect("written");
+    let ended = planish(["check".as_ref(), out.of("disk.stl").as_os_str()]);
+    assert!(ended.code == Some(1) && ended.err.contains("atlas-enlarged.msh: is not listed"), "{}", ended.err);
 }
 
 #[test]

@@ -132,9 +132,12 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
     let asked_for = report.settings.hand_off == HandOff::Gmsh;
     let failed = report.hand_off.as_ref().is_some_and(|h| h.failure.is_some());
     let handed_off = HANDED_OFF.iter().filter(|_| asked_for && !failed);
+    let is_enlarged = report.hand_off.as_ref().is_some_and(|h| h.enlarged != 1.0);
+    let enlarged = [gmsh::ENLARGED];
     let missing = REQUIRED
         .iter()
         .chain(handed_off)
+        .chain(enlarged.iter().filter(|_| is_enlarged))
         .filter(unlisted)
         .map(|name| file(name, "is not listed in the report's outputs"));
     let damaged = report.outputs.iter().filter_map(|output| {
