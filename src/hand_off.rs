@@ -124,6 +124,16 @@ fn narrow(charts: &[Chart], network: &SeamNetwork, adapted: &[usize], size: f64)
     found
 }
 
+/// The area of a chart.
+fn area_of(chart: &Chart) -> f64 {
+    (0..chart.triangles().len()).map(|f| chart.area(f)).sum()
+}
+
+/// The length of a loop.
+fn length_of(turn: &[Passage], network: &SeamNetwork) -> f64 {
+    turn.iter().map(|p| network.curves()[p.curve.index()].length()).sum()
+}
+
 /// How large a chart is, in the unit of the input.
 struct Extent {
     area: f64,
@@ -132,11 +142,8 @@ struct Extent {
 
 impl Extent {
     fn of(chart: &Chart, network: &SeamNetwork) -> Self {
-        let length = |p: &Passage| network.curves()[p.curve.index()].length();
-        Self {
-            area: (0..chart.triangles().len()).map(|f| chart.area(f)).sum(),
-            perimeter: network.loops(chart.id()).iter().flatten().map(length).sum(),
-        }
+        let loops = network.loops(chart.id());
+        Self { area: area_of(chart), perimeter: loops.iter().map(|turn| length_of(turn, network)).sum() }
     }
 
     /// The width of a strip of any length, the radius of a disk.
@@ -152,10 +159,9 @@ impl Extent {
 fn wanted_sizes(charts: &[Chart], network: &SeamNetwork) -> Vec<f64> {
     let mut wanted: Vec<f64> = network.curves().iter().map(Curve::length).collect();
     for chart in charts {
-        let length = |turn: &Vec<Passage>| turn.iter().map(|p| network.curves()[p.curve.index()].length()).sum::<f64>();
         let width = Extent::of(chart, network).width() / ELEMENTS_ACROSS;
         for turn in network.loops(chart.id()) {
-            let size = width.min(length(turn) / EDGES_PER_LOOP);
+            let size = width.min(length_of(turn, network) / EDGES_PER_LOOP);
             for passage in turn {
                 let known = &mut wanted[passage.curve.index()];
                 *known = known.min(size);
@@ -169,8 +175,7 @@ fn wanted_sizes(charts: &[Chart], network: &SeamNetwork) -> Vec<f64> {
 fn algorithms(charts: &[Chart], linear: &LinearAtlas, distortions: &[Summary], size: f64) -> gmsh::Algorithms {
     let stretches = |c: usize| {
         let Summary { conformal_p99, area_ratio, .. } = distortions[c];
-        let area: f64 = (0..charts[c].triangles().len()).map(|f| charts[c].area(f)).sum();
-        let is_quick = area < QUICK * size * size && area_ratio < EVEN;
+        let is_quick = area_of(&charts[c]) < QUICK * size * size && area_ratio < EVEN;
         let is_linear = linear.linear_charts().contains(&ChartId::at(c));
         is_linear || conformal_p99 > if is_quick { BENT } else { STRETCHED }
     };

@@ -38,6 +38,11 @@ pub fn triangle_area(p: [Vec3; 3]) -> f64 {
     0.5 * norm(cross(sub(p[1], p[0]), sub(p[2], p[0])))
 }
 
+/// The bits of a point, with negative zero turned into zero: equal where the coordinates are.
+pub(crate) fn bits_of(p: Vec3) -> [u64; 3] {
+    p.map(|c| (c + 0.0).to_bits())
+}
+
 /// An axis-aligned box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundingBox {

@@ -17,7 +17,7 @@
 mod cracks;
 mod near;
 mod t_junctions;
-mod weld;
+pub(crate) mod weld;
 
 use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::{Census, EdgeTable, Metric, SurfaceMesh, TriangleSoup, Umbrellas};

@@ -3,7 +3,7 @@
 use super::Draft;
 use crate::id::VertexId;
 use crate::mesh::TriangleSoup;
-use crate::space::Vec3;
+use crate::space::{Vec3, bits_of};
 
 /// Places of the table that are looked at per point, on average and at most.
 const LOOKS: usize = 8;
@@ -14,21 +14,28 @@ const NONE: u32 = u32::MAX;
 /// Merges points with equal coordinates (0 and -0 are equal); returns the draft and how many points were merged
 /// away. Vertices are numbered in the order of their first appearance among the points.
 pub(super) fn weld(soup: &TriangleSoup) -> (Draft, usize) {
-    let first = first_by_table(soup.points()).unwrap_or_else(|| first_by_order(soup.points()));
+    let (number, points) = distinct(soup.points());
+    let merged = number.len() - points.len();
+    let triangles: Vec<_> = soup.triangles().iter().map(|t| t.map(|i| number[i as usize])).collect();
+    let source = (0..triangles.len() as u32).collect();
+    (Draft { points, triangles, source }, merged)
+}
+
+/// Per point the number of the one that stands for all with equal coordinates (0 and -0 are equal), and these, in the order
+/// of their first appearance.
+pub(crate) fn distinct(points: &[Vec3]) -> (Vec<VertexId>, Vec<Vec3>) {
+    let first = first_by_table(points).unwrap_or_else(|| first_by_order(points));
     let mut number = vec![VertexId(0); first.len()];
-    let mut points = Vec::new();
+    let mut kept = Vec::new();
     for (i, &f) in first.iter().enumerate() {
         number[i] = if f as usize == i {
-            points.push(soup.points()[i].map(|c| c + 0.0));
-            VertexId::at(points.len() - 1)
+            kept.push(points[i].map(|c| c + 0.0));
+            VertexId::at(kept.len() - 1)
         } else {
             number[f as usize]
         };
     }
-    let merged = first.len() - points.len();
-    let triangles: Vec<_> = soup.triangles().iter().map(|t| t.map(|i| number[i as usize])).collect();
-    let source = (0..triangles.len() as u32).collect();
-    (Draft { points, triangles, source }, merged)
+    (number, kept)
 }
 
 /// For each point the first one that is equal, by a table in which a point lies at the first free place from that of its
@@ -68,11 +75,6 @@ fn first_by_order(points: &[Vec3]) -> Vec<u32> {
         equal.iter().for_each(|e| first[e.1 as usize] = equal[0].1);
     }
     first
-}
-
-/// The bits of a point, with negative zero turned into zero.
-fn bits_of(p: Vec3) -> [u64; 3] {
-    p.map(|c| (c + 0.0).to_bits())
 }
 
 /// A number that differs in its high bits for points that do not.

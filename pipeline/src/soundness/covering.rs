@@ -14,7 +14,7 @@ use super::{Defect, SurfaceDistance};
 use crate::evaluate::Plane;
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, VertexId};
-use crate::space::{Vec3, unit_scale};
+use crate::space::{Vec3, bits_of, unit_scale};
 use std::collections::BTreeMap;
 
 /// Looks at one chart with the given triangles of the mesh. `distance` learns how far its nodes are from it.
@@ -124,7 +124,7 @@ impl Rim {
         all.sort_unstable();
         for open in all.chunk_by(|a, b| a == b).filter(|same| same.len() == 1) {
             for node in [open[0].0, open[0].1].map(|n| n as usize) {
-                count.insert(bits(map.points()[node]), map.uv()[node]);
+                count.insert(bits_of(map.points()[node]), map.uv()[node]);
             }
         }
         Self { uv: count }
@@ -133,12 +133,8 @@ impl Rim {
     /// Where a node on a curve lies in the plane.
     fn place(&self, on: &OnCurve, curves: &[Vec<Vec3>]) -> Option<[f64; 2]> {
         let curve = &curves[on.curve as usize];
-        let end = |e: usize| self.uv.get(&bits(*curve.get(on.side as usize + e)?)).copied();
+        let end = |e: usize| self.uv.get(&bits_of(*curve.get(on.side as usize + e)?)).copied();
         let (from, to) = (end(0)?, end(1)?);
         Some([0, 1].map(|k| (1.0 - on.share) * from[k] + on.share * to[k]))
     }
-}
-
-fn bits(p: Vec3) -> [u64; 3] {
-    p.map(|c| (c + 0.0).to_bits())
 }

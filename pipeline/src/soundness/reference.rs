@@ -2,6 +2,7 @@
 
 use crate::evaluate::{Bvh, LinearMap, triangle_bvh};
 use crate::id::VertexId;
+use crate::repair::weld::distinct;
 use crate::space::{BoundingBox, Vec3, triangle_area};
 
 /// A triangulated surface or mesh whose points are all different.
@@ -20,16 +21,8 @@ impl Triangulation {
     /// # Panics
     /// Where a triangle names a point that does not exist.
     pub fn welded(points: &[Vec3], triangles: impl IntoIterator<Item = [u32; 3]>) -> Self {
-        let bits = |i: u32| points[i as usize].map(|c| (c + 0.0).to_bits());
-        let mut order: Vec<u32> = (0..points.len() as u32).collect();
-        order.sort_unstable_by_key(|i| (bits(*i), *i));
-        let mut number = vec![0_u32; points.len()];
-        let mut kept = Vec::new();
-        for equal in order.chunk_by(|a, b| bits(*a) == bits(*b)) {
-            equal.iter().for_each(|i| number[*i as usize] = kept.len() as u32);
-            kept.push(points[equal[0] as usize]);
-        }
-        let triangles = triangles.into_iter().map(|t| t.map(|i| VertexId(number[i as usize]))).collect();
+        let (number, kept) = distinct(points);
+        let triangles = triangles.into_iter().map(|t| t.map(|i| number[i as usize])).collect();
         Self { points: kept, triangles }
     }
 
