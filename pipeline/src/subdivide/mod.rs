@@ -6,7 +6,8 @@
 //! parts (a curved triangle may be valid by a hair along a whole side) the chart is handed over by the map from which
 //! its untangling started: it is certified too, and its triangles are straight. Where even its curved sides at the
 //! boundary need too many, their chords take their place, and that map is certified anew: its parts are similar to its
-//! triangles, so they turn left wherever these do. Nodes on seams are the same numbers in
+//! triangles, so they turn left wherever these do, unless its neighbours have its boundary cut so small that the grid
+//! is too coarse for it: then they get a plainer map, too. Nodes on seams are the same numbers in
 //! all charts, and a curve is exactly the sides of the triangles along it: nothing cracks or overlaps.
 //!
 //! Meshers compute normals from the numbers as written and fail where one is exactly zero: in this copy, and only
@@ -25,10 +26,11 @@ use crate::curvature::Principal;
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, CurveId, FaceId, VertexId};
 use crate::mesh::SurfaceMesh;
-use crate::seams::SeamNetwork;
+use crate::seams::{Curve, SeamNetwork};
 use crate::space::Vec3;
 use nodes::Nodes;
 use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The charts of a surface as linear triangulations that share the nodes on their seams.
 #[derive(Clone, Debug)]
@@ -221,16 +223,74 @@ fn split(mesh: &SurfaceMesh, charts: &[Chart], maps: &[CertifiedChart], network:
             }
             Err(failed) => failed,
         };
-        for inverted in failed {
-            let chart = inverted.chart.index();
+        for (chart, inverted) in blamed(failed, &by, network, &nodes)? {
             let start = &maps[chart].start;
             (by[chart], chosen[chart]) = match by[chart] {
                 HandedOver::Certified => (HandedOver::Start, Cow::Borrowed(start)),
-                HandedOver::Start => (HandedOver::Chords, Cow::Owned(with_chords(start).ok_or(inverted)?)),
-                HandedOver::Chords => return Err(inverted.into()),
+                _ => (HandedOver::Chords, Cow::Owned(with_chords(start).ok_or(inverted)?)),
             };
         }
     }
+}
+
+/// The charts that need a plainer map, so that those that `failed` come out right.
+///
+/// That is a chart itself, unless it has the plainest map already: its parts turn left then, all by themselves, and
+/// only what its neighbours halved for their own sake has cut them so small that the grid is too coarse for them.
+///
+/// # Errors
+/// A chart that failed, and no chart is left that could be plainer.
+fn blamed(
+    failed: Vec<Inverted>,
+    by: &[HandedOver],
+    network: &SeamNetwork,
+    nodes: &Nodes,
+) -> Result<BTreeMap<usize, Inverted>, Inverted> {
+    let mut blamed = BTreeMap::new();
+    let mut halved = None;
+    for inverted in failed {
+        let chart = inverted.chart.index();
+        if by[chart] != HandedOver::Chords {
+            blamed.insert(chart, inverted);
+            continue;
+        }
+        let halved = halved.get_or_insert_with(|| beside_halved_curves(by.len(), network, nodes));
+        let nearest = nearest(chart, halved, |c| by[c] != HandedOver::Chords);
+        if nearest.is_empty() {
+            return Err(inverted);
+        }
+        nearest.into_iter().for_each(|c| drop(blamed.entry(c).or_insert_with(|| inverted.clone())));
+    }
+    Ok(blamed)
+}
+
+/// Per chart, those on the other side of curves that have more nodes than ends and middles of edges.
+fn beside_halved_curves(charts: usize, network: &SeamNetwork, nodes: &Nodes) -> Vec<BTreeSet<usize>> {
+    let mut beside = vec![BTreeSet::new(); charts];
+    let is_halved = |c: &&Curve| nodes.along(c).len() > 2 * c.segments() + 1;
+    for curve in network.curves().iter().filter(is_halved) {
+        for (a, b) in curve.sides().iter().flat_map(|a| curve.sides().iter().map(move |b| (a, b))) {
+            beside[a.chart.index()].insert(b.chart.index());
+        }
+    }
+    beside
+}
+
+/// The charts that are `wanted` in the fewest steps from one to its neighbours that reach any.
+fn nearest(from: usize, neighbours: &[BTreeSet<usize>], wanted: impl Fn(usize) -> bool) -> Vec<usize> {
+    let mut seen = BTreeSet::from([from]);
+    let mut ring = vec![from];
+    while !ring.is_empty() {
+        let next = ring.iter().flat_map(|c| &neighbours[*c]).copied();
+        let next: BTreeSet<usize> = next.filter(|c| !seen.contains(c)).collect();
+        let found: Vec<usize> = next.iter().copied().filter(|c| wanted(*c)).collect();
+        if !found.is_empty() {
+            return found;
+        }
+        seen.extend(&next);
+        ring = next.into_iter().collect();
+    }
+    vec![]
 }
 
 /// A map with every mid-edge node in the middle of its edge, certified anew; none where it is not one-to-one.

@@ -145,6 +145,37 @@ fn inverted_parts_are_refined_in_all_charts_around() {
     assert_eq!(all.points().iter().flatten().filter(|c| !c.is_finite()).count(), 0);
 }
 
+/// The map of a chart of one straight triangle, as small as one around the origin can be on the grid, and as long as the
+/// disk is wide: of neighbouring Fibonacci numbers F, F_(n+1) F_(n-1) - F_n^2 = 1 for even n.
+fn hair(chart: &Chart) -> CertifiedMap {
+    let t = chart.triangles()[0].map(|v| v.0);
+    let cells = vec![[t[0], t[1], t[2], 3, 4, 5]];
+    let mut fibonacci = [0.0, 1.0, 1.0];
+    for _ in 0..74 {
+        fibonacci = [fibonacci[1], fibonacci[2], fibonacci[1] + fibonacci[2]];
+    }
+    let [f74, f75, f76] = fibonacci.map(|f: f64| f * 2.0_f64.powi(-52));
+    let corners = [[-f76, -f75], [f75, f74], [f74, f75 - f74]].map(GridPoint::vertex);
+    let mut nodes = vec![GridPoint::default(); 6];
+    for k in 0..3 {
+        nodes[t[k] as usize] = corners[k];
+        nodes[3 + k] = corners[k].midpoint(corners[(k + 1) % 3]);
+    }
+    prove(PlanarMap { cells, nodes, hole_centres: vec![] }).expect("valid")
+}
+
+#[test]
+fn charts_too_thin_to_be_halved_make_their_neighbours_plainer() {
+    let mut sample = tetrahedron([true, false, false, false]);
+    for chart in 1..4 {
+        let thin = hair(&sample.atlas.charts()[chart]);
+        (sample.maps[chart].certified, sample.maps[chart].start) = (thin.clone(), thin);
+    }
+    let linear = sample.verified();
+    assert!(linear.linear_charts().contains(&ChartId(0)), "{:?}", linear.linear_charts());
+    assert_eq!(linear.refined(), 0, "nothing is halved any more");
+}
+
 /// How many parts of the first chart are inverted when every triangle is split into four.
 fn quartered_inverted_parts(sample: &Sample) -> usize {
     let nodes = Nodes::new(&sample.mesh, &sample.network, sample.atlas.charts());
