@@ -10,6 +10,7 @@ use pipeline::id::{ChartId, FaceId};
 use pipeline::mesh::SurfaceMesh;
 use pipeline::seams::{Curve, Passage, SeamNetwork};
 use pipeline::space::unit_scale;
+use pipeline::spikes::spikes;
 use pipeline::subdivide::{self, LinearAtlas, subdivide};
 
 /// Gmsh gets at least this many edges along the diagonal of the bounding box, unless another size is asked for.
@@ -49,6 +50,9 @@ const SMALL: f64 = 60.0;
 /// have as many elements as all others together.
 const MOST_EDGES: f64 = 200.0;
 
+/// Gmsh asks every size field at every step: so many balls around spikes take it no longer than the mesh itself.
+const MOST_SPIKES: usize = 1_000;
+
 /// MeshAdapt of Gmsh looks for closest points among all triangles within this distance, in whatever unit.
 const SEARCHED: f64 = 0.1;
 
@@ -84,14 +88,21 @@ pub fn gmsh(
             return HandedOff { files: vec![], report: HandOff { failure: Some(failure), ..report } };
         }
     };
+    let algorithms = algorithms(charts, &linear, distortions, size);
+    let narrow = narrow(charts, network, &algorithms.adapted, size);
+    let mut spikes = spikes(mesh, charts, linear.curvatures(), size);
+    let narrow_curves = narrow.iter().map(|n| n.curves.len()).sum();
+    let mut report = HandOff { narrow_curves, spikes: spikes.len(), ..counted(report, &linear, &algorithms) };
+    if spikes.len() > MOST_SPIKES {
+        report.warning.get_or_insert_with(|| too_coarse_for_spikes(size, spikes.len()));
+        spikes.truncate(MOST_SPIKES);
+    }
     if let Some(warning) = &report.warning {
         tracing::warn!("hand-off to Gmsh: {warning}");
     }
-    let algorithms = algorithms(charts, &linear, distortions, size);
-    let narrow = narrow(charts, network, &algorithms.adapted, size);
-    let report =
-        HandOff { narrow_curves: narrow.iter().map(|n| n.curves.len()).sum(), ..counted(report, &linear, &algorithms) };
-    HandedOff { files: files(mesh, charts, &linear, network, size, algorithms, narrow), report }
+    let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
+    let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow, spikes };
+    HandedOff { files: files(charts, &linear, network, &script), report }
 }
 
 /// The curves along narrow places and the small charts, by the size of elements there: half of `size`, a quarter, and so on.
@@ -192,21 +203,16 @@ fn algorithms(charts: &[Chart], linear: &LinearAtlas, distortions: &[Summary], s
 }
 
 fn files(
-    mesh: &SurfaceMesh,
     charts: &[Chart],
     linear: &LinearAtlas,
     network: &SeamNetwork,
-    size: f64,
-    algorithms: gmsh::Algorithms,
-    narrow: Vec<gmsh::Narrow>,
+    script: &gmsh::Script,
 ) -> Vec<(String, Vec<u8>)> {
-    let enlarged = Some(algorithms.enlarged).filter(|factor| *factor != 1.0);
-    let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
-    let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow };
     let mut files = vec![
         (gmsh::ATLAS.to_owned(), gmsh::atlas(charts, linear, network)),
-        (gmsh::REMESH.to_owned(), gmsh::remesh(&script)),
+        (gmsh::REMESH.to_owned(), gmsh::remesh(script)),
     ];
+    let enlarged = Some(script.algorithms.enlarged).filter(|factor| *factor != 1.0);
     files.extend(enlarged.map(|by| (gmsh::ENLARGED.to_owned(), gmsh::enlarged(linear, network, by))));
     files
 }
@@ -243,6 +249,14 @@ fn too_coarse(size: f64, distance: f64) -> String {
     format!(
         "the edge length {size:.4e} is more than half the shortest distance between two seams of a chart \
          ({distance:.4e}): triangles of neighbouring charts may come to lie on each other; {remedy}"
+    )
+}
+
+fn too_coarse_for_spikes(size: f64, spikes: usize) -> String {
+    format!(
+        "the edge length {size:.4e} is too long for {spikes} places in spikes and pits, of which remesh.geo looks after \
+         {MOST_SPIKES}: others may be cut off; give --size {:.4e} or less",
+        0.5 * size
     )
 }
 

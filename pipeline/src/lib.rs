@@ -79,6 +79,7 @@ pub mod quadratic;
 pub mod repair;
 pub mod seams;
 pub mod soundness;
+pub mod spikes;
 pub mod subdivide;
 pub mod untangle;
 

@@ -383,6 +383,9 @@ pub struct HandOff {
     /// Curves along narrow places, where remesh.geo asks for smaller elements.
     #[serde(default)]
     pub narrow_curves: usize,
+    /// Spikes and pits, where remesh.geo asks for smaller elements.
+    #[serde(default)]
+    pub spikes: usize,
     /// By how much lengths are multiplied in the atlas that remesh.geo merges; 1: that is atlas.msh.
     #[serde(default = "unchanged")]
     pub enlarged: f64,

@@ -259,7 +259,9 @@ fn blamed(
         if nearest.is_empty() {
             return Err(inverted);
         }
-        nearest.into_iter().for_each(|c| drop(blamed.entry(c).or_insert_with(|| inverted.clone())));
+        for chart in nearest {
+            blamed.entry(chart).or_insert_with(|| inverted.clone());
+        }
     }
     Ok(blamed)
 }

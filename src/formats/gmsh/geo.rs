@@ -1,6 +1,7 @@
 //! `remesh.geo`: a script that merges the atlas, sets sizes, and tells its reader what to change.
 
 use super::{ATLAS, ENLARGED};
+use pipeline::spikes::Spike;
 
 /// From about this many triangles on, the script asks for the faster algorithm.
 const MANY: u32 = 20_000;
@@ -20,6 +21,8 @@ pub struct Script {
     pub algorithms: Algorithms,
     /// Where elements are smaller.
     pub narrow: Vec<Narrow>,
+    /// Where they are, too.
+    pub spikes: Vec<Spike>,
 }
 
 /// Curves along places that are narrower than an edge.
@@ -57,8 +60,9 @@ pub struct Algorithms {
 
 /// The bytes of `remesh.geo`.
 pub fn remesh(script: &Script) -> Vec<u8> {
-    let Script { size, area, surfaces, curves, algorithms, narrow } = script;
+    let Script { size, area, surfaces, curves, algorithms, narrow, spikes } = script;
     let factor = algorithms.enlarged;
+    let is_uniform = narrow.is_empty() && spikes.is_empty();
     format!(
         "// Remesh this surface through its certified maps:
 //
@@ -100,9 +104,9 @@ Mesh.AlgorithmSwitchOnFailure = 0;
 ",
         merge = merge(factor),
         times = if factor == 1.0 { String::new() } else { format!(" * {factor}") },
-        but = if narrow.is_empty() { "" } else { ", but in narrow places" },
-        least = if narrow.is_empty() { String::new() } else { format!("1 / {} * ", 2_u32.pow(Narrow::HALVINGS)) },
-        fields = fields(narrow, factor),
+        but = if is_uniform { "" } else { ", but in narrow places" },
+        least = if is_uniform { String::new() } else { format!("1 / {} * ", 2_u32.pow(Narrow::HALVINGS)) },
+        fields = fields(narrow, spikes, factor),
         adapted = adapted(&algorithms.adapted),
     )
     .into_bytes()
@@ -138,63 +142,110 @@ MeshAlgorithm Surface {{{}}} = 1;
     )
 }
 
-/// Smaller elements in narrow places, and ever larger ones away from them.
-fn fields(narrow: &[Narrow], factor: f64) -> String {
-    if narrow.is_empty() {
-        return String::new();
-    }
-    let mut text = String::from(
-        "
+/// Smaller elements in narrow places and spikes, and ever larger ones away from them.
+fn fields(narrow: &[Narrow], spikes: &[Spike], factor: f64) -> String {
+    let mut fields = Fields { factor, ..Fields::default() };
+    if !narrow.is_empty() {
+        fields.text += "
 // Smaller elements around curves that are shorter than an edge, or bound charts that are narrower.
-",
-    );
-    let mut fields = Vec::new();
-    let mut last = 0;
-    for place in narrow {
-        let size = place.size;
-        let smaller = format!("(size < {size} ? size : {size}) * {factor}");
-        if !place.curves.is_empty() {
-            let (distance, threshold) = (last + 1, last + 2);
-            let samples = (place.longest / size).ceil().clamp(10.0, Narrow::MOST_SAMPLES);
-            text += &format!(
-                "Field[{distance}] = Distance;
-Field[{distance}].CurvesList = {{{curves}}};
-Field[{distance}].Sampling = {samples};
-Field[{threshold}] = Threshold;
-Field[{threshold}].InField = {distance};
-Field[{threshold}].SizeMin = {smaller};
-Field[{threshold}].SizeMax = size * {factor};
-Field[{threshold}].DistMin = {size} * {factor};
-Field[{threshold}].DistMax = (size < {size} ? {size} : size) / {gradation} * {factor};
-",
-                curves = tags(&place.curves),
-                gradation = Narrow::GRADATION,
-            );
-            fields.push(last + 1);
-            last = threshold;
-        }
-        if !place.surfaces.is_empty() {
-            last += 1;
-            text += &format!(
-                "Field[{last}] = Constant;
-Field[{last}].SurfacesList = {{{surfaces}}};
-Field[{last}].IncludeBoundary = 1;
-Field[{last}].VIn = {smaller};
-Field[{last}].VOut = size * {factor};
-",
-                surfaces = tags(&place.surfaces),
-            );
-            fields.push(last - 1);
-        }
+";
     }
-    let all = last + 1;
-    text + &format!(
-        "Field[{all}] = Min;
-Field[{all}].FieldsList = {{{}}};
-Background Field = {all};
-",
-        tags(&fields)
-    )
+    for place in narrow {
+        fields.around_curves(place);
+        fields.on_surfaces(place);
+    }
+    if !spikes.is_empty() {
+        fields.text += "
+// Smaller elements in spikes and pits, the tips of which would be cut off.
+";
+    }
+    spikes.iter().for_each(|s| fields.in_ball(s));
+    fields.finished()
+}
+
+/// Size fields of Gmsh, the smallest of which counts.
+#[derive(Default)]
+struct Fields {
+    text: String,
+    /// How many fields there are.
+    last: usize,
+    /// The fields that tell sizes.
+    sizes: Vec<usize>,
+    /// By how much lengths are multiplied.
+    factor: f64,
+}
+
+impl Fields {
+    /// Begins a field of a kind, and gives its number.
+    fn begin(&mut self, kind: &str) -> usize {
+        self.last += 1;
+        self.text += &format!("Field[{}] = {kind};\n", self.last);
+        self.last
+    }
+
+    /// Gives the last field an option.
+    fn option(&mut self, name: &str, value: impl std::fmt::Display) {
+        self.text += &format!("Field[{}].{name} = {value};\n", self.last);
+    }
+
+    /// `size`, unless the user asks for less.
+    fn at_most(&self, size: f64) -> String {
+        format!("(size < {size} ? size : {size}) * {}", self.factor)
+    }
+
+    fn around_curves(&mut self, place: &Narrow) {
+        if place.curves.is_empty() {
+            return;
+        }
+        let (size, factor) = (place.size, self.factor);
+        let distance = self.begin("Distance");
+        self.option("CurvesList", format!("{{{}}}", tags(&place.curves)));
+        self.option("Sampling", (place.longest / size).ceil().clamp(10.0, Narrow::MOST_SAMPLES));
+        let threshold = self.begin("Threshold");
+        self.option("InField", distance);
+        self.option("SizeMin", self.at_most(size));
+        self.option("SizeMax", format!("size * {factor}"));
+        self.option("DistMin", format!("{size} * {factor}"));
+        let far = format!("(size < {size} ? {size} : size) / {} * {factor}", Narrow::GRADATION);
+        self.option("DistMax", far);
+        self.sizes.push(threshold);
+    }
+
+    fn on_surfaces(&mut self, place: &Narrow) {
+        if place.surfaces.is_empty() {
+            return;
+        }
+        let constant = self.begin("Constant");
+        self.option("SurfacesList", format!("{{{}}}", tags(&place.surfaces)));
+        self.option("IncludeBoundary", 1);
+        self.option("VIn", self.at_most(place.size));
+        self.option("VOut", format!("size * {}", self.factor));
+        self.sizes.push(constant);
+    }
+
+    fn in_ball(&mut self, spike: &Spike) {
+        let factor = self.factor;
+        let ball = self.begin("Ball");
+        for (axis, c) in ["XCenter", "YCenter", "ZCenter"].into_iter().zip(spike.centre) {
+            self.option(axis, format!("{c} * {factor}"));
+        }
+        self.option("Radius", format!("{} * {factor}", spike.radius));
+        self.option("Thickness", format!("{} * {factor}", spike.radius));
+        self.option("VIn", self.at_most(spike.size));
+        self.option("VOut", format!("size * {factor}"));
+        self.sizes.push(ball);
+    }
+
+    /// The text, with the field that is the smallest of all.
+    fn finished(mut self) -> String {
+        if self.sizes.is_empty() {
+            return self.text;
+        }
+        let one_less: Vec<usize> = self.sizes.iter().map(|f| f - 1).collect();
+        let all = self.begin("Min");
+        self.option("FieldsList", format!("{{{}}}", tags(&one_less)));
+        self.text + &format!("Background Field = {all};\n")
+    }
 }
 
 /// The tags of entities that are counted from 0, in lines of twenty.
@@ -208,7 +259,11 @@ mod tests {
     use super::*;
 
     fn script(algorithms: Algorithms, narrow: Vec<Narrow>) -> String {
-        let script = Script { size: 0.1 + 0.2, area: 4.5, surfaces: 2, curves: 1, algorithms, narrow };
+        script_with(algorithms, narrow, vec![])
+    }
+
+    fn script_with(algorithms: Algorithms, narrow: Vec<Narrow>, spikes: Vec<Spike>) -> String {
+        let script = Script { size: 0.1 + 0.2, area: 4.5, surfaces: 2, curves: 1, algorithms, narrow, spikes };
         String::from_utf8(remesh(&script)).expect("UTF-8")
     }
 
@@ -241,6 +296,22 @@ mod tests {
             "Field[5].SizeMin = (size < 0.075 ? size : 0.075) * 4;",
             "Field[7].FieldsList = {2, 3, 5, 6};",
             "Background Field = 7;",
+        ] {
+            assert!(text.contains(line), "{line} is not in\n{text}");
+        }
+    }
+
+    #[test]
+    fn spikes_have_balls() {
+        let spike = Spike { centre: [0.5, -1.0, 2e-7], radius: 0.6, size: 0.15 };
+        let text = script_with(Algorithms { adapted: vec![], enlarged: 4.0 }, vec![], vec![spike]);
+        for line in [
+            "Field[1] = Ball;",
+            "Field[1].YCenter = -1 * 4;",
+            "Field[1].ZCenter = 0.0000002 * 4;",
+            "Field[1].Radius = 0.6 * 4;",
+            "Field[1].VIn = (size < 0.15 ? size : 0.15) * 4;",
+            "Background Field = 2;",
         ] {
             assert!(text.contains(line), "{line} is not in\n{text}");
         }
