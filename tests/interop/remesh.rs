@@ -312,6 +312,38 @@ fn rows_of_long_facets_are_whole() {
     assert!(lost.out.contains("NOT FAITHFUL") && lost.out.contains("lost"), "{}", lost.out);
 }
 
+/// The tip of a needle, around which no edge goes, is meshed all the same.
+#[test]
+fn the_tip_of_a_needle_is_kept() {
+    let out = Out::new();
+    let inputs = tempfile::tempdir().expect("a folder");
+    let path = inputs.path().join("needle.obj");
+    std::fs::write(&path, needle(40, 16.0)).expect("written");
+    assert_eq!(out.run(&[&path], &["-q"]).code, Some(0));
+    let folder = out.of("needle.obj");
+    assert_eq!(out.report("needle.obj").hand_off.map(|h| h.spikes), Some(3), "one for each halving");
+    gmsh(&folder, |text| text);
+    let whole = check_mesh(&folder, &[]);
+    assert_eq!(whole.code, Some(0), "{}{}", whole.out, whole.err);
+    // The known-bad twin: edges of the same length everywhere.
+    gmsh(&folder, |text| text.replace("Background Field", "// Background Field"));
+    let lost = check_mesh(&folder, &[]);
+    assert_eq!(lost.code, Some(1), "{}", lost.out);
+    assert!(lost.out.contains("a part of the surface is lost") && lost.out.contains("16.0"), "{}", lost.out);
+}
+
+/// A closed cone of `n` facets over a circle of radius 1, as OBJ.
+fn needle(n: u32, height: f64) -> String {
+    let angle = |i: u32| TAU * f64::from(i) / f64::from(n);
+    let mut text = format!("v 0 0 0\nv 0 0 {height}\n");
+    (0..n).for_each(|i| text += &format!("v {} {} 0\n", angle(i).cos(), angle(i).sin()));
+    for i in 0..n {
+        let (a, b) = (i + 3, (i + 1) % n + 3);
+        text += &format!("f 1 {b} {a}\nf 2 {a} {b}\n");
+    }
+    text
+}
+
 /// A cylinder of radius 1 and height 8 whose wall is one row of `n` facets, with round caps of `rows` rows, as OBJ.
 fn pill(n: u32, rows: u32) -> String {
     let angle = |i: u32| TAU * f64::from(i) / f64::from(n);
