@@ -169,7 +169,7 @@ impl<'a> CurveSides<'a> {
         let sides: Vec<(u32, u32)> = (0..).zip(curves).flat_map(|(k, c)| (0..count(c)).map(move |i| (k, i))).collect();
         let ends = |(k, i): &(u32, u32)| [0, 1].map(|e| curves[*k as usize][*i as usize + e]);
         let nothing = BoundingBox { min: [0.0; 3], max: [0.0; 3] };
-        let tree = Bvh::new(sides.iter().map(|s| BoundingBox::of(ends(s)).unwrap_or(nothing)).collect());
+        let tree = Bvh::new(sides.iter().map(|s| BoundingBox::of(ends(s)).unwrap_or(nothing)));
         Self { curves, sides, tree }
     }
 

@@ -38,6 +38,7 @@ pub fn crossings(mesh: &Triangulation, tree: &Bvh, surface: &Triangulation, cont
             pairs.push([a, b]);
         }
     });
+    pairs.sort_unstable();
     let mut found = Crossings::default();
     if pairs.is_empty() {
         return found;

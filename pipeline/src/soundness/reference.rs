@@ -48,8 +48,7 @@ impl Triangulation {
 
     /// The triangles, by where they are.
     pub fn bvh(&self) -> Bvh {
-        let triangles: Vec<[u32; 3]> = self.triangles.iter().map(|t| t.map(|v| v.0)).collect();
-        triangle_bvh(&self.points, &triangles)
+        triangle_bvh((0..self.triangles.len()).map(|t| self.corners(t)))
     }
 }
 
