@@ -6,7 +6,7 @@
 use super::check::{folder, read, read_report};
 use super::{Exit, complain, say, say_json, shown};
 use crate::formats::gmsh;
-use crate::formats::vtu::{self, Grid};
+use crate::formats::vtu::{self, Shape};
 use crate::formats::{self, Kind, Nothing, Patches, READ, Source};
 use crate::outcome::Reason;
 use crate::report::mesh::{MeshReport, PLACES};
@@ -100,13 +100,13 @@ pub fn check_mesh(
 fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<MeshReport, Unjudged> {
     let told = |problem: &dyn std::fmt::Display| Unjudged::Told(problem.to_string());
     let report = read_report(folder).map_err(|e| told(&e))?;
-    let (surface_file, grid) = surface(folder, &report)?;
+    let (surface_file, shape) = surface(folder, &report)?;
     let size = question.size.or(report.hand_off.as_ref().map(|h| h.size)).ok_or(Unjudged::NoSize)?;
     let bytes = read_file(&question.mesh).map_err(|e| told(&e.message))?;
     let patches = decode(&question.mesh, &bytes, settings).map_err(|e| told(&e.message))?;
-    let charts: Vec<u32> = grid.chart.iter().map(|c| u32::try_from(*c).unwrap_or(u32::MAX)).collect();
-    let corners = grid.cells.iter().map(|[a, b, c, ..]| [*a, *b, *c]);
-    let surface = Triangulation::welded(&grid.points, corners);
+    let charts: Vec<u32> = shape.chart.iter().map(|c| u32::try_from(*c).unwrap_or(u32::MAX)).collect();
+    let corners = shape.cells.iter().map(|[a, b, c, ..]| [*a, *b, *c]);
+    let surface = Triangulation::welded(&shape.points, corners);
     let atlas = if patches.surfaces().is_some() { atlas(folder, &report)? } else { None };
     let asked = soundness::Settings { size, min_gamma: question.min_gamma, off_surface: OFF_SURFACE };
     let found = soundness::examine(&mesh(&patches), &surface, &charts, atlas.as_ref(), &asked);
@@ -115,10 +115,10 @@ fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<Mesh
 }
 
 /// The surface of a result, as it was published.
-fn surface(folder: &Path, report: &Report) -> Result<(Output, Grid), Unjudged> {
+fn surface(folder: &Path, report: &Report) -> Result<(Output, Shape), Unjudged> {
     let bytes = published(folder, report, "surface.vtu")?.ok_or(Unjudged::Changed("surface.vtu"))?;
-    let grid = vtu::read(&bytes).map_err(|e| Unjudged::Told(format!("surface.vtu: {e}")))?;
-    Ok((Output::of("surface.vtu", &bytes), grid))
+    let shape = vtu::read_shape(&bytes).map_err(|e| Unjudged::Told(format!("surface.vtu: {e}")))?;
+    Ok((Output::of("surface.vtu", &bytes), shape))
 }
 
 /// The maps that the mesher used, if the result has any.

@@ -96,7 +96,7 @@ fn end_of(rest: &[u8], section: &[u8], is_binary: bool) -> Option<(usize, usize)
     let stands = |at: &usize| {
         rest[*at..].starts_with(&name) && (is_binary || *at == 0 || blank(at - 1)) && blank(at + name.len())
     };
-    let at = (0..rest.len()).filter(|at| rest[*at] == b'$').find(stands)?;
+    let at = memchr::memchr_iter(b'$', rest).find(stands)?;
     Some((at, at + name.len()))
 }
 
