@@ -48,7 +48,7 @@ impl Bvh {
     /// A hierarchy of `boxes`: item `i` is the `i`-th of them.
     pub fn new(boxes: impl IntoIterator<Item = BoundingBox>) -> Self {
         let boxes: Vec<BoundingBox> = boxes.into_iter().collect();
-        let cells = sorted_cells(&boxes);
+        let cells = sorted_cells(&boxes.iter().map(centre).collect::<Vec<_>>());
         let items = cells.iter().map(|(_, number)| Item { around: boxes[*number as usize], number: *number }).collect();
         let mut tree = Self { nodes: Vec::with_capacity(boxes.len()), items };
         if !cells.is_empty() {
@@ -109,10 +109,10 @@ impl Bvh {
         while let Some((far, at)) = next {
             let node = &self.nodes[at as usize];
             if far < least && node.second > 0 {
-                let parts = [at + 1, node.second].map(|part| (gap(&self.nodes[part as usize].around, x), part));
-                let [near, far] = if parts[0].0 <= parts[1].0 { parts } else { [parts[1], parts[0]] };
-                open.push(far);
-                next = Some(near);
+                let (first, second) = (self.part(at + 1, x), self.part(node.second, x));
+                let is_ordered = first.0 <= second.0;
+                open.push(if is_ordered { second } else { first });
+                next = Some(if is_ordered { first } else { second });
                 continue;
             }
             let items = if far < least { self.items_of(node) } else { &[] };
@@ -128,6 +128,12 @@ impl Bvh {
             next = open.pop();
         }
         best
+    }
+
+    /// A node, and how far it is from `x`.
+    #[inline]
+    fn part(&self, node: u32, x: Vec3) -> (f64, u32) {
+        (gap(&self.nodes[node as usize].around, x), node)
     }
 
     /// Calls `visit` with every pair of items whose boxes meet, the lesser one first. The pairs come in no order that means
@@ -210,25 +216,32 @@ fn parting(cells: &[(u64, u32)], depth: usize) -> usize {
     cells.partition_point(|(cell, _)| cell & highest == 0)
 }
 
-/// The cells of the centres of boxes, in the order of the Z-curve through them, each with the number of its box.
-fn sorted_cells(boxes: &[BoundingBox]) -> Vec<(u64, u32)> {
-    let centre = |b: &BoundingBox| [0, 1, 2].map(|k| 0.5 * b.min[k] + 0.5 * b.max[k]);
-    let Some(all) = BoundingBox::of(boxes.iter().map(centre)) else { return vec![] };
+#[inline]
+fn centre(b: &BoundingBox) -> Vec3 {
+    [0, 1, 2].map(|k| 0.5 * b.min[k] + 0.5 * b.max[k])
+}
+
+/// The numbers of points in the order of a Z-curve through them: those that follow each other are near each other.
+pub fn along_curve(points: &[Vec3]) -> impl Iterator<Item = u32> {
+    sorted_cells(points).into_iter().map(|(_, number)| number)
+}
+
+/// The cells of points, in the order of the Z-curve through them, each with the number of its point.
+fn sorted_cells(points: &[Vec3]) -> Vec<(u64, u32)> {
+    let Some(all) = BoundingBox::of(points.iter().copied()) else { return vec![] };
     let extent = (0..3).map(|k| all.max[k] - all.min[k]).fold(0.0, larger);
     let count = f64::from(1_u32 << BITS);
     // Cells are cubes, whatever the shape of the whole.
     let scale = if extent > 0.0 { count / extent } else { 0.0 };
-    let along = |x: f64, from: f64| ((x - from) * scale).min(count - 1.0) as u64;
-    let cell = |b: &BoundingBox| {
-        let x = centre(b);
-        (0..3).fold(0, |cell, k| cell | spread(along(x[k], all.min[k])) << k)
-    };
-    let mut cells: Vec<(u64, u32)> = boxes.iter().map(cell).zip(0..).collect();
+    let along = |x: f64, from: f64| spread(((x - from) * scale).min(count - 1.0) as u64);
+    let cell = |x: &Vec3| along(x[0], all.min[0]) | along(x[1], all.min[1]) << 1 | along(x[2], all.min[2]) << 2;
+    let mut cells: Vec<(u64, u32)> = points.iter().map(cell).zip(0..).collect();
     cells.sort_unstable();
     cells
 }
 
 /// The bits of a number of [`BITS`] bits, two zeros between each two of them.
+#[inline]
 fn spread(x: u64) -> u64 {
     let steps = [
         (32, 0x001F_0000_0000_FFFF),
@@ -241,6 +254,7 @@ fn spread(x: u64) -> u64 {
 }
 
 /// The smallest box around two.
+#[inline]
 pub fn joined(a: BoundingBox, b: BoundingBox) -> BoundingBox {
     BoundingBox {
         min: [0, 1, 2].map(|k| smaller(a.min[k], b.min[k])),
@@ -248,15 +262,19 @@ pub fn joined(a: BoundingBox, b: BoundingBox) -> BoundingBox {
     }
 }
 
-fn smaller(a: f64, b: f64) -> f64 {
+/// The smaller one of two numbers, as [`larger`].
+#[inline]
+pub(super) fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
 /// The larger one of two numbers. Unlike [`f64::max`] it is one instruction: it need not tell what is no number.
-fn larger(a: f64, b: f64) -> f64 {
+#[inline]
+pub(super) fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
+#[inline]
 fn meet(a: &BoundingBox, b: &BoundingBox) -> bool {
     // All sides at once: which one parts two boxes cannot be foreseen.
     let along = |k: usize| (a.min[k] <= b.max[k]) & (b.min[k] <= a.max[k]);
@@ -264,6 +282,7 @@ fn meet(a: &BoundingBox, b: &BoundingBox) -> bool {
 }
 
 /// The squared distance of a point to a box.
+#[inline]
 fn gap(b: &BoundingBox, x: Vec3) -> f64 {
     let along = |k: usize| larger(larger(b.min[k] - x[k], x[k] - b.max[k]), 0.0);
     let [u, v, w] = [along(0), along(1), along(2)];

@@ -12,7 +12,8 @@ mod bvh;
 mod closest;
 mod plane;
 
-pub use bvh::Bvh;
+pub use bvh::{Bvh, along_curve};
+use bvh::{larger, smaller};
 pub use closest::{OnTriangle, on_segment, on_triangle};
 pub use plane::Plane;
 
@@ -104,8 +105,8 @@ fn lifted([u, v]: [f64; 2]) -> Vec3 {
 /// A hierarchy of triangles by their corners.
 pub fn triangle_bvh(corners: impl IntoIterator<Item = [Vec3; 3]>) -> Bvh {
     let around = |[a, b, c]: [Vec3; 3]| BoundingBox {
-        min: [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k])),
-        max: [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k])),
+        min: [0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])),
+        max: [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k])),
     };
     Bvh::new(corners.into_iter().map(around))
 }

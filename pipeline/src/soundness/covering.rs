@@ -12,7 +12,7 @@ use super::loops::{self, Wrong};
 use super::open::sides_of_one;
 use super::reference::{HandedOverAtlas, HandedOverChart, Mesh};
 use super::{Defect, SurfaceDistance};
-use crate::evaluate::Plane;
+use crate::evaluate::{Plane, along_curve};
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, VertexId};
 use crate::space::{Vec3, bits_of, unit_scale};
@@ -32,10 +32,13 @@ impl InPlane {
         Self { chart: vec![None; nodes], grid: vec![GridPoint::default(); nodes] }
     }
 
-    /// The nodes of triangles of a chart, each of them once.
+    /// The nodes of triangles of a chart, each of them once. What follows each other is near each other: what is looked at
+    /// for one is at hand for the next.
     fn nodes(&mut self, mesh: &Mesh, triangles: &[u32], id: ChartId) -> Vec<VertexId> {
         let all = triangles.iter().flat_map(|t| mesh.triangulation.triangles[*t as usize]);
-        all.filter(|v| self.chart[v.index()].replace(id) != Some(id)).collect()
+        let nodes: Vec<VertexId> = all.filter(|v| self.chart[v.index()].replace(id) != Some(id)).collect();
+        let places: Vec<Vec3> = nodes.iter().map(|v| mesh.triangulation.points[v.index()]).collect();
+        along_curve(&places).map(|i| nodes[i as usize]).collect()
     }
 
     /// Places nodes on the grid.

@@ -98,26 +98,31 @@ fn touch(surface: &Triangulation, a: u32, b: u32, contact: f64) -> bool {
 
 /// Whether two triangles cross.
 fn cross_each_other(mesh: &Triangulation, a: u32, b: u32) -> bool {
-    let [s, t] = [a, b].map(|i| mesh.triangles[i as usize]);
+    let (s, t) = (&mesh.triangles[a as usize], &mesh.triangles[b as usize]);
     let shared = s.iter().filter(|v| t.contains(v)).count();
-    let [p, q] = [a, b].map(|i| mesh.corners(i as usize));
+    let corners = || (mesh.corners(a as usize), mesh.corners(b as usize));
     match shared {
-        0 => (0..3).any(|k| pierces([p[k], p[(k + 1) % 3]], q) || pierces([q[k], q[(k + 1) % 3]], p)),
+        0 => {
+            let (p, q) = corners();
+            (0..3).any(|k| pierces([p[k], p[(k + 1) % 3]], q) || pierces([q[k], q[(k + 1) % 3]], p))
+        }
         1 => {
+            let (p, q) = corners();
             let opposite = |t: &[_; 3], other: &[_; 3], p: [Vec3; 3]| {
                 let k = (0..3).find(|k| other.contains(&t[*k])).unwrap_or(0);
                 [p[(k + 1) % 3], p[(k + 2) % 3]]
             };
-            pierces(opposite(&s, &t, p), q) || pierces(opposite(&t, &s, q), p)
+            pierces(opposite(s, t, p), q) || pierces(opposite(t, s, q), p)
         }
         _ => false,
     }
 }
 
 /// Whether a segment passes through the inside of a triangle, beyond doubt.
+#[inline]
 fn pierces([a, b]: [Vec3; 2], t: [Vec3; 3]) -> bool {
-    let ends = [volume(t[0], t[1], t[2], a), volume(t[0], t[1], t[2], b)];
-    if ends[0] * ends[1] >= 0 {
+    let begin = volume(t[0], t[1], t[2], a);
+    if begin == 0 || begin * volume(t[0], t[1], t[2], b) >= 0 {
         return false;
     }
     let sides = [0, 1, 2].map(|k| volume(a, b, t[k], t[(k + 1) % 3]));
@@ -125,15 +130,12 @@ fn pierces([a, b]: [Vec3; 2], t: [Vec3; 3]) -> bool {
 }
 
 /// The sign of the volume of a tetrahedron; 0 where rounding could have made it.
+#[inline]
 fn volume(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
     let (u, v, w) = (sub(a, d), sub(b, d), sub(c, d));
     let found = dot(u, cross(v, w));
-    let terms: f64 = (0..3)
-        .map(|k| {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            u[k].abs() * ((v[i] * w[j]).abs() + (v[j] * w[i]).abs())
-        })
-        .sum();
+    let minor = |i: usize, j: usize| (v[i] * w[j]).abs() + (v[j] * w[i]).abs();
+    let terms = u[0].abs() * minor(1, 2) + u[1].abs() * minor(2, 0) + u[2].abs() * minor(0, 1);
     if found.abs() <= ROUNDING * terms { 0 } else { found.signum() as i8 }
 }
 

@@ -27,8 +27,10 @@ impl Triangulation {
     }
 
     /// The corners of a triangle in space.
+    #[inline]
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
-        self.triangles[triangle].map(|v| self.points[v.index()])
+        let [a, b, c] = self.triangles[triangle];
+        [self.points[a.index()], self.points[b.index()], self.points[c.index()]]
     }
 
     /// The area of a triangle.
