@@ -270,7 +270,7 @@ pub(super) fn smaller(a: f64, b: f64) -> f64 {
 
 /// The larger one of two numbers. Unlike [`f64::max`] it is one instruction: it need not tell what is no number.
 #[inline]
-pub(super) fn larger(a: f64, b: f64) -> f64 {
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 

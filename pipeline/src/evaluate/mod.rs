@@ -12,8 +12,9 @@ mod bvh;
 mod closest;
 mod plane;
 
+pub(crate) use bvh::larger;
+use bvh::smaller;
 pub use bvh::{Bvh, along_curve};
-use bvh::{larger, smaller};
 pub use closest::{OnTriangle, on_segment, on_triangle};
 pub use plane::Plane;
 
@@ -104,11 +105,16 @@ fn lifted([u, v]: [f64; 2]) -> Vec3 {
 
 /// A hierarchy of triangles by their corners.
 pub fn triangle_bvh(corners: impl IntoIterator<Item = [Vec3; 3]>) -> Bvh {
-    let around = |[a, b, c]: [Vec3; 3]| BoundingBox {
+    Bvh::new(corners.into_iter().map(box_around))
+}
+
+/// The box around a triangle.
+#[inline]
+pub(crate) fn box_around([a, b, c]: [Vec3; 3]) -> BoundingBox {
+    BoundingBox {
         min: [0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])),
         max: [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k])),
-    };
-    Bvh::new(corners.into_iter().map(around))
+    }
 }
 
 /// The point closest to `x` of triangles in a hierarchy, if it is nearer than `bound`; `corners` tells those of a triangle.

@@ -7,7 +7,7 @@
 //! the plane of its map shows them.
 
 use super::reference::Triangulation;
-use crate::evaluate::{Bvh, on_triangle};
+use crate::evaluate::{Bvh, box_around, larger, on_triangle};
 use crate::seams::segment_distance;
 use crate::space::{BoundingBox, Vec3, cross, dot, sub};
 
@@ -43,10 +43,9 @@ pub fn crossings(mesh: &Triangulation, tree: &Bvh, surface: &Triangulation, cont
     if pairs.is_empty() {
         return found;
     }
-    let surface_bvh = &surface.bvh();
-    let mut looks = LOOKS;
+    let mut near = NearSurface::new(surface, contact);
     for pair in pairs {
-        if surface_crosses(mesh, pair, surface, surface_bvh, contact, &mut looks) {
+        if near.crosses(pair.map(|t| mesh.corners(t as usize))) {
             found.in_surface += 1;
         } else {
             found.pairs.push(pair);
@@ -55,31 +54,54 @@ pub fn crossings(mesh: &Triangulation, tree: &Bvh, surface: &Triangulation, cont
     found
 }
 
-/// Whether triangles of the surface cross or touch within the boxes of two crossing triangles of the mesh, as far as the
-/// looks that are left can tell.
-fn surface_crosses(
-    mesh: &Triangulation,
-    pair: [u32; 2],
-    surface: &Triangulation,
-    bvh: &Bvh,
+/// The surface, to be searched for triangles that cross or touch.
+struct NearSurface<'a> {
+    surface: &'a Triangulation,
+    tree: Bvh,
+    boxes: Vec<BoundingBox>,
+    /// So close to each other triangles touch.
     contact: f64,
-    looks: &mut usize,
-) -> bool {
-    let near = pair.map(|t| {
-        let mut near = Vec::new();
-        let around = BoundingBox::of(mesh.corners(t as usize));
-        around.iter().for_each(|b| bvh.overlapping(b, |s| near.push(s)));
-        near
-    });
-    let all = near[0].iter().flat_map(|s| near[1].iter().map(move |t| (*s, *t)));
-    for (s, t) in all {
-        let Some(left) = looks.checked_sub(1) else { return false };
-        *looks = left;
-        if s != t && (cross_each_other(surface, s, t) || touch(surface, s, t, contact)) {
-            return true;
-        }
+    /// Looks that are left.
+    looks: usize,
+}
+
+impl<'a> NearSurface<'a> {
+    fn new(surface: &'a Triangulation, contact: f64) -> Self {
+        let boxes: Vec<BoundingBox> = (0..surface.triangles.len()).map(|t| box_around(surface.corners(t))).collect();
+        Self { surface, tree: Bvh::new(boxes.iter().copied()), boxes, contact, looks: LOOKS }
     }
-    false
+
+    /// Whether triangles of the surface cross or touch within the boxes of two crossing triangles of the mesh, as far as
+    /// the looks that are left can tell.
+    fn crosses(&mut self, pair: [[Vec3; 3]; 2]) -> bool {
+        let near = pair.map(|corners| {
+            let mut near = Vec::new();
+            self.tree.overlapping(&box_around(corners), |s| near.push(s));
+            near
+        });
+        for s in &near[0] {
+            for t in &near[1] {
+                let Some(left) = self.looks.checked_sub(1) else { return false };
+                self.looks = left;
+                if s != t && self.cross_or_touch(*s, *t) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn cross_or_touch(&self, s: u32, t: u32) -> bool {
+        // What is farther apart than rounding can make of the contact does neither.
+        let apart = gap_between(&self.boxes[s as usize], &self.boxes[t as usize]);
+        apart <= 2.0 * self.contact && (cross_each_other(self.surface, s, t) || touch(self.surface, s, t, self.contact))
+    }
+}
+
+/// How far two boxes are apart along the axis where they are farthest apart; 0 at most where they meet.
+fn gap_between(a: &BoundingBox, b: &BoundingBox) -> f64 {
+    let along = |k: usize| larger(a.min[k] - b.max[k], b.min[k] - a.max[k]);
+    larger(larger(along(0), along(1)), along(2))
 }
 
 /// Whether two triangles that share no vertex have corners or sides that are closer than `contact` to each other.
