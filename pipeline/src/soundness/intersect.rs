@@ -121,32 +121,36 @@ fn touch(surface: &Triangulation, a: u32, b: u32, contact: f64) -> bool {
 /// Whether two triangles cross.
 fn cross_each_other(mesh: &Triangulation, a: u32, b: u32) -> bool {
     let (s, t) = (&mesh.triangles[a as usize], &mesh.triangles[b as usize]);
-    let shared = s.iter().filter(|v| t.contains(v)).count();
-    let corners = || (mesh.corners(a as usize), mesh.corners(b as usize));
-    match shared {
-        0 => {
-            let (p, q) = corners();
-            (0..3).any(|k| pierces([p[k], p[(k + 1) % 3]], q) || pierces([q[k], q[(k + 1) % 3]], p))
-        }
-        1 => {
-            let (p, q) = corners();
-            let opposite = |t: &[_; 3], other: &[_; 3], p: [Vec3; 3]| {
-                let k = (0..3).find(|k| other.contains(&t[*k])).unwrap_or(0);
-                [p[(k + 1) % 3], p[(k + 2) % 3]]
-            };
-            pierces(opposite(s, t, p), q) || pierces(opposite(t, s, q), p)
-        }
-        _ => false,
-    }
-}
-
-/// Whether a segment passes through the inside of a triangle, beyond doubt.
-#[inline]
-fn pierces([a, b]: [Vec3; 2], t: [Vec3; 3]) -> bool {
-    let begin = volume(t[0], t[1], t[2], a);
-    if begin == 0 || begin * volume(t[0], t[1], t[2], b) >= 0 {
+    if s.iter().filter(|v| t.contains(v)).count() > 1 {
         return false;
     }
+    let (p, q) = (mesh.corners(a as usize), mesh.corners(b as usize));
+    // Where all corners of one triangle lie on one side of the other, but for a shared one, no side of either passes
+    // through the other.
+    let Some(of_p) = sides_taken(p, q, |k| t.contains(&s[k])) else { return false };
+    let Some(of_q) = sides_taken(q, p, |k| s.contains(&t[k])) else { return false };
+    let side = |p: [Vec3; 3], k: usize| [p[k], p[(k + 1) % 3]];
+    let parted = |taken: [i8; 3], k: usize| taken[k] * taken[(k + 1) % 3] < 0;
+    (0..3).any(|k| {
+        parted(of_p, k) && passes_by_inside(side(p, k), q) || parted(of_q, k) && passes_by_inside(side(q, k), p)
+    })
+}
+
+/// On which side of the plane of `t` the corners of `p` lie, 0 for those that it shares or that rounding could have put
+/// there. None where the corners that it does not share lie on one side, beyond doubt.
+#[inline]
+fn sides_taken(p: [Vec3; 3], t: [Vec3; 3], is_shared: impl Fn(usize) -> bool) -> Option<[i8; 3]> {
+    let mut taken = [0; 3];
+    let mut all = [true; 2];
+    for k in (0..3).filter(|k| !is_shared(*k)) {
+        taken[k] = volume(t[0], t[1], t[2], p[k]);
+        all = [all[0] && taken[k] > 0, all[1] && taken[k] < 0];
+    }
+    if all[0] || all[1] { None } else { Some(taken) }
+}
+
+/// Whether the line of a segment passes a triangle on the inside of all its sides, beyond doubt.
+fn passes_by_inside([a, b]: [Vec3; 2], t: [Vec3; 3]) -> bool {
     let sides = [0, 1, 2].map(|k| volume(a, b, t[k], t[(k + 1) % 3]));
     sides == [1, 1, 1] || sides == [-1, -1, -1]
 }
