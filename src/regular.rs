@@ -105,15 +105,25 @@ fn patiently(open: impl Fn() -> rustix::io::Result<OwnedFd>) -> io::Result<Owned
 /// # Errors
 /// [`OpenError`]. What is too large at first sight is not read.
 pub fn read(file: &File, most: u64) -> Result<Vec<u8>, OpenError> {
+    let mut bytes = Vec::new();
+    read_into(file, most, &mut bytes)?;
+    Ok(bytes)
+}
+
+/// As [`read`], in the place of what `bytes` hold: memory that is there is used again.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_into(file: &File, most: u64, bytes: &mut Vec<u8>) -> Result<(), OpenError> {
+    bytes.clear();
     let size = file.metadata()?.len();
     if size > most {
         return Err(OpenError::TooLarge { size, most });
     }
-    let mut bytes = Vec::new();
     bytes.try_reserve_exact(usize::try_from(size).unwrap_or(usize::MAX)).map_err(io::Error::other)?;
-    file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+    file.take(most.saturating_add(1)).read_to_end(bytes)?;
     let size = bytes.len() as u64;
-    if size > most { Err(OpenError::TooLarge { size, most }) } else { Ok(bytes) }
+    if size > most { Err(OpenError::TooLarge { size, most }) } else { Ok(()) }
 }
 
 #[cfg(test)]

@@ -54,7 +54,17 @@ pub fn read_input(job: &Job, settings: &Settings) -> Result<Vec<u8>, Reason> {
 /// # Errors
 /// Why it cannot be read.
 pub fn read_file(path: &Path) -> Result<Vec<u8>, Reason> {
-    regular::open(path).and_then(|file| regular::read(&file, u64::MAX)).map_err(unreadable)
+    let mut bytes = Vec::new();
+    read_file_into(path, &mut bytes)?;
+    Ok(bytes)
+}
+
+/// As [`read_file`], in the place of what `bytes` hold: memory that is there is used again.
+///
+/// # Errors
+/// As [`read_file`].
+pub fn read_file_into(path: &Path, bytes: &mut Vec<u8>) -> Result<(), Reason> {
+    regular::open(path).and_then(|file| regular::read_into(&file, u64::MAX, bytes)).map_err(unreadable)
 }
 
 fn unreadable(error: OpenError) -> Reason {

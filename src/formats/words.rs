@@ -41,10 +41,12 @@ impl<'a> Words<'a> {
         (!word.is_empty()).then_some(word)
     }
 
-    /// Passes over so many bytes, which must end at a blank or the end.
+    /// Passes over so many bytes, which must end at a blank or the end, and behind a word.
     pub fn advance(&mut self, bytes: usize) {
-        let end = self.rest.len() - bytes;
-        while self.rest.len() > end && self.next().is_some() {}
+        let (passed, rest) = self.rest.split_at(bytes);
+        let is_pair = |at: usize| passed[at] == b'\r' && passed.get(at + 1) == Some(&b'\n');
+        self.line += memchr::memchr2_iter(b'\n', b'\r', passed).filter(|at| !is_pair(*at)).count();
+        self.rest = rest;
     }
 
     /// Passes over the rest of the line.
@@ -169,6 +171,14 @@ mod tests {
         }
         let expected = [("a", 8), ("b", 8), ("c", 9), ("d", 10), ("e", 12)];
         assert_eq!(found, expected.map(|(word, line)| (word.to_owned(), line)));
+    }
+
+    #[test]
+    fn what_is_passed_over_has_lines() {
+        let text = b"\n a b\r\nc\rd\n\n  e f";
+        let mut words = Words::new(text, 7);
+        words.advance(text.len() - 2);
+        assert_eq!((words.line(), words.next(), words.next()), (12, Some(&b"f"[..]), None));
     }
 
     #[test]

@@ -3,16 +3,16 @@
 //! The surface is read from surface.vtu, the maps that the mesher used from atlas.msh: both must be what was published.
 //! What is found is told, and kept as mesh.json beside the report.
 
-use super::check::{folder, read, read_report};
+use super::check::{folder, read_report};
 use super::{Exit, complain, say, say_json, shown};
 use crate::formats::gmsh;
-use crate::formats::vtu::{self, Grid};
+use crate::formats::vtu::{self, Shape};
 use crate::formats::{self, Kind, Nothing, Patches, READ, Source};
 use crate::outcome::Reason;
 use crate::report::mesh::{MeshReport, PLACES};
 use crate::report::{Output, Report};
 use crate::settings::Settings;
-use crate::stages::{guard, read_file};
+use crate::stages::{guard, read_file_into};
 use pipeline::soundness::{self, HandedOverAtlas, Mesh, Triangulation};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -100,39 +100,61 @@ pub fn check_mesh(
 fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<MeshReport, Unjudged> {
     let told = |problem: &dyn std::fmt::Display| Unjudged::Told(problem.to_string());
     let report = read_report(folder).map_err(|e| told(&e))?;
-    let (surface_file, grid) = surface(folder, &report)?;
+    // Files are large, and one is done with before the next: they share their memory.
+    let mut bytes = Vec::new();
+    let (surface_file, surface, charts) = surface(folder, &report, &mut bytes)?;
     let size = question.size.or(report.hand_off.as_ref().map(|h| h.size)).ok_or(Unjudged::NoSize)?;
-    let bytes = read_file(&question.mesh).map_err(|e| told(&e.message))?;
+    read_file_into(&question.mesh, &mut bytes).map_err(|e| told(&e.message))?;
     let patches = decode(&question.mesh, &bytes, settings).map_err(|e| told(&e.message))?;
-    let charts: Vec<u32> = grid.chart.iter().map(|c| u32::try_from(*c).unwrap_or(u32::MAX)).collect();
-    let corners = grid.cells.iter().map(|[a, b, c, ..]| [*a, *b, *c]);
-    let surface = Triangulation::welded(&grid.points, corners);
-    let atlas = if patches.surfaces().is_some() { atlas(folder, &report)? } else { None };
+    let name = question.mesh.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let mesh_file = Output::of(&name, &bytes);
+    let atlas = if patches.surfaces().is_some() { atlas(folder, &report, &mut bytes)? } else { None };
+    drop(bytes);
     let asked = soundness::Settings { size, min_gamma: question.min_gamma, off_surface: OFF_SURFACE };
     let found = soundness::examine(&mesh(&patches), &surface, &charts, atlas.as_ref(), &asked);
-    let name = question.mesh.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    Ok(MeshReport::new(Output::of(&name, &bytes), surface_file, size, question.min_gamma, &found))
+    Ok(MeshReport::new(mesh_file, surface_file, size, question.min_gamma, &found))
 }
 
-/// The surface of a result, as it was published.
-fn surface(folder: &Path, report: &Report) -> Result<(Output, Grid), Unjudged> {
-    let bytes = published(folder, report, "surface.vtu")?.ok_or(Unjudged::Changed("surface.vtu"))?;
-    let grid = vtu::read(&bytes).map_err(|e| Unjudged::Told(format!("surface.vtu: {e}")))?;
-    Ok((Output::of("surface.vtu", &bytes), grid))
+/// The surface of a result, as it was published, and the chart of each triangle.
+fn surface(folder: &Path, report: &Report, bytes: &mut Vec<u8>) -> Result<(Output, Triangulation, Vec<u32>), Unjudged> {
+    let file = published(folder, report, "surface.vtu", bytes)?.ok_or(Unjudged::Changed("surface.vtu"))?;
+    let shape = vtu::read_shape(bytes).map_err(|e| Unjudged::Told(format!("surface.vtu: {e}")))?;
+    let charts = shape.chart.iter().map(|c| u32::try_from(*c).unwrap_or(u32::MAX)).collect();
+    Ok((file, corners_of(&shape), charts))
+}
+
+/// The triangles of a surface by their corners, without the nodes in the middle of sides.
+fn corners_of(shape: &Shape) -> Triangulation {
+    let mut number = vec![u32::MAX; shape.points.len()];
+    let corners = || shape.cells.iter().map(|[a, b, c, ..]| [*a, *b, *c]);
+    corners().flatten().for_each(|node| number[node as usize] = 0);
+    let mut points = Vec::new();
+    for (number, point) in number.iter_mut().zip(&shape.points).filter(|(number, _)| **number == 0) {
+        *number = points.len() as u32;
+        points.push(*point);
+    }
+    Triangulation::welded(&points, corners().map(|t| t.map(|node| number[node as usize])))
 }
 
 /// The maps that the mesher used, if the result has any.
-fn atlas(folder: &Path, report: &Report) -> Result<Option<HandedOverAtlas>, Unjudged> {
-    let Some(bytes) = published(folder, report, gmsh::ATLAS)? else { return Ok(None) };
-    let atlas = gmsh::read_atlas(&bytes).map_err(|e| Unjudged::Told(format!("{}: {e}", gmsh::ATLAS)))?;
+fn atlas(folder: &Path, report: &Report, bytes: &mut Vec<u8>) -> Result<Option<HandedOverAtlas>, Unjudged> {
+    let Some(_) = published(folder, report, gmsh::ATLAS, bytes)? else { return Ok(None) };
+    let atlas = gmsh::read_atlas(bytes).map_err(|e| Unjudged::Told(format!("{}: {e}", gmsh::ATLAS)))?;
     Ok(Some(atlas))
 }
 
-/// The bytes of a file of the result; none where it has no such file.
-fn published(folder: &Path, report: &Report, name: &'static str) -> Result<Option<Vec<u8>>, Unjudged> {
+/// Reads a file of the result into `bytes`; none where it has no such file.
+fn published(
+    folder: &Path,
+    report: &Report,
+    name: &'static str,
+    bytes: &mut Vec<u8>,
+) -> Result<Option<Output>, Unjudged> {
     let Some(listed) = report.outputs.iter().find(|o| o.file == name) else { return Ok(None) };
-    let bytes = read(folder, name).map_err(|e| Unjudged::Told(e.to_string()))?;
-    if Output::of(name, &bytes) == *listed { Ok(Some(bytes)) } else { Err(Unjudged::Changed(name)) }
+    let told = |reason: Reason| Unjudged::Told(format!("{name}: {}", reason.message));
+    read_file_into(&folder.join(name), bytes).map_err(told)?;
+    let found = Output::of(name, bytes);
+    if found == *listed { Ok(Some(found)) } else { Err(Unjudged::Changed(name)) }
 }
 
 fn decode(path: &Path, bytes: &[u8], settings: &Settings) -> Result<Patches, Reason> {

@@ -12,7 +12,9 @@ mod bvh;
 mod closest;
 mod plane;
 
-pub use bvh::Bvh;
+pub(crate) use bvh::larger;
+use bvh::smaller;
+pub use bvh::{Bvh, along_curve};
 pub use closest::{OnTriangle, on_segment, on_triangle};
 pub use plane::Plane;
 
@@ -48,7 +50,7 @@ impl LinearMap {
     /// Where a triangle names a node that does not exist.
     pub fn new(points: Vec<Vec3>, uv: Vec<[f64; 2]>, triangles: Vec<[u32; 3]>) -> Self {
         assert_eq!(points.len(), uv.len(), "every node has both places");
-        let in_space = triangle_bvh(&points, &triangles);
+        let in_space = triangle_bvh(triangles.iter().map(|t| t.map(|n| points[n as usize])));
         Self { points, uv, triangles, in_space, in_plane: OnceLock::new() }
     }
 
@@ -77,8 +79,8 @@ impl LinearMap {
     pub fn to_space(&self, uv: [f64; 2]) -> Option<Located> {
         let corners = |f: u32| self.triangles[f as usize].map(|n| lifted(self.uv[n as usize]));
         let in_plane = self.in_plane.get_or_init(|| {
-            let flat: Vec<Vec3> = self.uv.iter().copied().map(lifted).collect();
-            triangle_bvh(&flat, &self.triangles)
+            let flat = |n: u32| lifted(self.uv[n as usize]);
+            triangle_bvh(self.triangles.iter().map(|t| t.map(flat)))
         });
         nearest(in_plane, lifted(uv), f64::INFINITY, corners)
     }
@@ -102,18 +104,17 @@ fn lifted([u, v]: [f64; 2]) -> Vec3 {
 }
 
 /// A hierarchy of triangles by their corners.
-///
-/// # Panics
-/// Where a triangle names a point that does not exist.
-pub fn triangle_bvh(points: &[Vec3], triangles: &[[u32; 3]]) -> Bvh {
-    let around = |t: &[u32; 3]| {
-        let [a, b, c] = t.map(|n| points[n as usize]);
-        BoundingBox {
-            min: [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k])),
-            max: [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k])),
-        }
-    };
-    Bvh::new(triangles.iter().map(around).collect())
+pub fn triangle_bvh(corners: impl IntoIterator<Item = [Vec3; 3]>) -> Bvh {
+    Bvh::new(corners.into_iter().map(box_around))
+}
+
+/// The box around a triangle.
+#[inline]
+pub(crate) fn box_around([a, b, c]: [Vec3; 3]) -> BoundingBox {
+    BoundingBox {
+        min: [0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])),
+        max: [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k])),
+    }
 }
 
 /// The point closest to `x` of triangles in a hierarchy, if it is nearer than `bound`; `corners` tells those of a triangle.

@@ -9,13 +9,51 @@
 
 use super::curves::{Boundaries, OnCurve};
 use super::loops::{self, Wrong};
+use super::open::sides_of_one;
 use super::reference::{HandedOverAtlas, HandedOverChart, Mesh};
 use super::{Defect, SurfaceDistance};
-use crate::evaluate::Plane;
+use crate::evaluate::{Plane, along_curve};
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, VertexId};
 use crate::space::{Vec3, bits_of, unit_scale};
 use std::collections::BTreeMap;
+
+/// Where the nodes of a mesh lie in the plane of the chart at hand, on the grid. One table serves all charts.
+#[derive(Debug)]
+pub struct InPlane {
+    /// Per node, the last chart that has it.
+    chart: Vec<Option<ChartId>>,
+    grid: Vec<GridPoint>,
+}
+
+impl InPlane {
+    /// Nothing known of so many nodes.
+    pub fn new(nodes: usize) -> Self {
+        Self { chart: vec![None; nodes], grid: vec![GridPoint::default(); nodes] }
+    }
+
+    /// The nodes of triangles of a chart, each of them once. What follows each other is near each other: what is looked at
+    /// for one is at hand for the next.
+    fn nodes(&mut self, mesh: &Mesh, triangles: &[u32], id: ChartId) -> Vec<VertexId> {
+        let all = triangles.iter().flat_map(|t| mesh.triangulation.triangles[*t as usize]);
+        let nodes: Vec<VertexId> = all.filter(|v| self.chart[v.index()].replace(id) != Some(id)).collect();
+        let places: Vec<Vec3> = nodes.iter().map(|v| mesh.triangulation.points[v.index()]).collect();
+        along_curve(&places).map(|i| nodes[i as usize]).collect()
+    }
+
+    /// Places nodes on the grid.
+    fn place(&mut self, nodes: &[VertexId], uv: &[[f64; 2]]) {
+        let largest = uv.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
+        let scale = unit_scale(largest);
+        for (v, uv) in nodes.iter().zip(uv) {
+            self.grid[v.index()] = GridPoint::mid(uv.map(|c| c * scale));
+        }
+    }
+
+    fn at(&self, v: VertexId) -> GridPoint {
+        self.grid[v.index()]
+    }
+}
 
 /// Looks at one chart with the given triangles of the mesh. `distance` learns how far its nodes are from it.
 pub fn check(
@@ -24,31 +62,19 @@ pub fn check(
     atlas: &HandedOverAtlas,
     id: ChartId,
     boundaries: &Boundaries,
+    in_plane: &mut InPlane,
     distance: &mut SurfaceDistance,
 ) -> Vec<Defect> {
     let chart = &atlas.charts[id.index()];
+    let nodes = in_plane.nodes(mesh, triangles, id);
     let places = &boundaries.places[id.index()];
-    let plane = Plane::of(chart.map.points(), chart.map.triangles());
-    let rim = if plane.is_some() { Rim::default() } else { Rim::of(chart) };
-    let mut uv: BTreeMap<VertexId, [f64; 2]> = BTreeMap::new();
-    for v in triangles.iter().flat_map(|t| mesh.triangulation.triangles[*t as usize]) {
-        let x = mesh.triangulation.points[v.index()];
-        uv.entry(v).or_insert_with(|| {
-            let located = chart.map.to_plane(x);
-            distance.note(v, located.map_or(f64::INFINITY, |l| l.distance));
-            let on_rim = || rim.place(places.get(&v)?, &atlas.curves);
-            match &plane {
-                Some(plane) => plane.place(x),
-                None => on_rim().or(located.map(|l| chart.map.uv_of(&l))).unwrap_or([f64::NAN; 2]),
-            }
-        });
-    }
-    let largest = uv.values().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
-    let scale = unit_scale(largest);
-    let grid: BTreeMap<VertexId, GridPoint> =
-        uv.into_iter().map(|(v, uv)| (v, GridPoint::mid(uv.map(|c| c * scale)))).collect();
+    let uv: Vec<[f64; 2]> = match Plane::of(chart.map.points(), chart.map.triangles()) {
+        Some(plane) => in_flat_chart(mesh, &nodes, chart, &plane, distance),
+        None => in_chart(mesh, &nodes, chart, |v, rim| rim.place(places.get(&v)?, &atlas.curves), distance),
+    };
+    in_plane.place(&nodes, &uv);
     let turn = |t: &&u32| {
-        let [a, b, c] = mesh.triangulation.triangles[**t as usize].map(|v| grid[&v]);
+        let [a, b, c] = mesh.triangulation.triangles[**t as usize].map(|v| in_plane.at(v));
         orientation(a, b, c) <= 0
     };
     let folded: Vec<u32> = triangles.iter().filter(turn).copied().collect();
@@ -57,23 +83,51 @@ pub fn check(
     if let Some(first) = folded.first() {
         defects.push(Defect::Folded { chart: id, triangles: folded.len(), at: centre(*first) });
     }
-    defects.extend(boundary_defect(mesh, id, &boundaries.open[id.index()], &grid));
+    defects.extend(boundary_defect(mesh, id, &boundaries.open[id.index()], in_plane));
     defects
 }
 
-/// What is wrong with the loops of a boundary in the plane.
-fn boundary_defect(
+/// Where nodes lie in the plane of a flat chart.
+fn in_flat_chart(
     mesh: &Mesh,
-    chart: ChartId,
-    open: &[[VertexId; 2]],
-    grid: &BTreeMap<VertexId, GridPoint>,
-) -> Option<Defect> {
+    nodes: &[VertexId],
+    chart: &HandedOverChart,
+    plane: &Plane,
+    distance: &mut SurfaceDistance,
+) -> Vec<[f64; 2]> {
+    let place = |v: &VertexId| {
+        let x = mesh.triangulation.points[v.index()];
+        distance.note(*v, chart.map.to_plane(x).map_or(f64::INFINITY, |l| l.distance));
+        plane.place(x)
+    };
+    nodes.iter().map(place).collect()
+}
+
+/// Where nodes lie in the map of a chart; `on_rim` places those on curves.
+fn in_chart(
+    mesh: &Mesh,
+    nodes: &[VertexId],
+    chart: &HandedOverChart,
+    on_rim: impl Fn(VertexId, &Rim) -> Option<[f64; 2]>,
+    distance: &mut SurfaceDistance,
+) -> Vec<[f64; 2]> {
+    let rim = Rim::of(chart);
+    let place = |v: &VertexId| {
+        let located = chart.map.to_plane(mesh.triangulation.points[v.index()]);
+        distance.note(*v, located.map_or(f64::INFINITY, |l| l.distance));
+        on_rim(*v, &rim).or(located.map(|l| chart.map.uv_of(&l))).unwrap_or([f64::NAN; 2])
+    };
+    nodes.iter().map(place).collect()
+}
+
+/// What is wrong with the loops of a boundary in the plane.
+fn boundary_defect(mesh: &Mesh, chart: ChartId, open: &[[VertexId; 2]], in_plane: &InPlane) -> Option<Defect> {
     let at = |v: VertexId| mesh.triangulation.points[v.index()];
     let loops = match chained(open) {
         Ok(loops) => loops,
         Err(v) => return Some(Defect::BoundaryPinched { chart, at: at(v) }),
     };
-    let polygons: Vec<Vec<GridPoint>> = loops.iter().map(|l| l.iter().map(|v| grid[v]).collect()).collect();
+    let polygons: Vec<Vec<GridPoint>> = loops.iter().map(|l| l.iter().map(|v| in_plane.at(*v)).collect()).collect();
     let place = |l: usize, i: usize| loops.get(l).and_then(|l| l.get(i)).map_or([f64::NAN; 3], |v| at(*v));
     loops::check(&polygons).map(|wrong| match wrong {
         Wrong::Crossing([(l, i), _]) => Defect::BoundaryCrosses { chart, at: place(l, i) },
@@ -118,16 +172,14 @@ struct Rim {
 
 impl Rim {
     fn of(chart: &HandedOverChart) -> Self {
-        let (map, mut count) = (&chart.map, BTreeMap::new());
-        let sides = |t: &[u32; 3]| [0, 1, 2].map(|k| (t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])));
-        let mut all: Vec<(u32, u32)> = map.triangles().iter().flat_map(sides).collect();
-        all.sort_unstable();
-        for open in all.chunk_by(|a, b| a == b).filter(|same| same.len() == 1) {
-            for node in [open[0].0, open[0].1].map(|n| n as usize) {
-                count.insert(bits_of(map.points()[node]), map.uv()[node]);
-            }
-        }
-        Self { uv: count }
+        let map = &chart.map;
+        let mut rim = Self::default();
+        let place = |n: u32| (bits_of(map.points()[n as usize]), map.uv()[n as usize]);
+        let triangles = || map.triangles().iter().map(|t| (0, *t));
+        let open = sides_of_one(map.points().len(), 1, triangles).into_iter().flatten();
+        // Of different nodes in one place, the last one counts.
+        rim.uv.extend(open.flat_map(|[a, b]| [a.min(b), a.max(b)]).map(place));
+        rim
     }
 
     /// Where a node on a curve lies in the plane.

@@ -5,6 +5,7 @@
 //! other open edge. Charts that share a curve then share its nodes, one by one.
 
 use super::Defect;
+use super::open::sides_of_one;
 use super::reference::{HandedOverAtlas, Mesh};
 use crate::evaluate::{Bvh, on_segment};
 use crate::id::{ChartId, CurveId, VertexId};
@@ -49,12 +50,9 @@ pub fn boundaries(mesh: &Mesh, triangles: &[Vec<u32>], atlas: &HandedOverAtlas, 
     let sides = CurveSides::new(&atlas.curves);
     let places_on = |v: VertexId| sides.at(mesh.triangulation.points[v.index()], tolerance);
     let mut known: BTreeMap<VertexId, Vec<OnCurve>> = BTreeMap::new();
-    for chart in triangles {
-        let open = open_edges(mesh, chart);
-        for v in open.iter().flatten() {
-            known.entry(*v).or_insert_with(|| places_on(*v));
-        }
-        found.open.push(open);
+    found.open = open_edges(mesh, triangles);
+    for v in found.open.iter().flatten().flatten() {
+        known.entry(*v).or_insert_with(|| places_on(*v));
     }
     let along = nodes_along(atlas, &found.open, &known);
     for (c, chart) in atlas.charts.iter().enumerate() {
@@ -73,15 +71,12 @@ pub fn boundaries(mesh: &Mesh, triangles: &[Vec<u32>], atlas: &HandedOverAtlas, 
     found
 }
 
-/// The sides of triangles that no other triangle of the chart has, as the triangles run.
-fn open_edges(mesh: &Mesh, chart: &[u32]) -> Vec<[VertexId; 2]> {
-    let sides = |t: &u32| {
-        let t = mesh.triangulation.triangles[*t as usize];
-        [0, 1, 2].map(|k| [t[k], t[(k + 1) % 3]])
-    };
-    let mut all: Vec<(Edge, [VertexId; 2])> = chart.iter().flat_map(sides).map(|s| (ordered(s), s)).collect();
-    all.sort_unstable();
-    all.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|one| one[0].1).collect()
+/// Per chart, the sides of triangles that no other triangle of the chart has, as the triangles run.
+fn open_edges(mesh: &Mesh, charts: &[Vec<u32>]) -> Vec<Vec<[VertexId; 2]>> {
+    let corners = |t: &u32| mesh.triangulation.triangles[*t as usize].map(|v| v.0);
+    let all = || (0..).zip(charts).flat_map(|(c, chart)| chart.iter().map(move |t| (c, corners(t))));
+    let open = sides_of_one(mesh.triangulation.points.len(), charts.len(), all);
+    open.into_iter().map(|sides| sides.into_iter().map(|side| side.map(VertexId)).collect()).collect()
 }
 
 fn ordered([a, b]: [VertexId; 2]) -> Edge {
@@ -169,7 +164,7 @@ impl<'a> CurveSides<'a> {
         let sides: Vec<(u32, u32)> = (0..).zip(curves).flat_map(|(k, c)| (0..count(c)).map(move |i| (k, i))).collect();
         let ends = |(k, i): &(u32, u32)| [0, 1].map(|e| curves[*k as usize][*i as usize + e]);
         let nothing = BoundingBox { min: [0.0; 3], max: [0.0; 3] };
-        let tree = Bvh::new(sides.iter().map(|s| BoundingBox::of(ends(s)).unwrap_or(nothing)).collect());
+        let tree = Bvh::new(sides.iter().map(|s| BoundingBox::of(ends(s)).unwrap_or(nothing)));
         Self { curves, sides, tree }
     }
 

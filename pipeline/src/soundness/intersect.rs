@@ -7,7 +7,7 @@
 //! the plane of its map shows them.
 
 use super::reference::Triangulation;
-use crate::evaluate::{Bvh, on_triangle};
+use crate::evaluate::{Bvh, box_around, larger, on_triangle};
 use crate::seams::segment_distance;
 use crate::space::{BoundingBox, Vec3, cross, dot, sub};
 
@@ -38,14 +38,14 @@ pub fn crossings(mesh: &Triangulation, tree: &Bvh, surface: &Triangulation, cont
             pairs.push([a, b]);
         }
     });
+    pairs.sort_unstable();
     let mut found = Crossings::default();
     if pairs.is_empty() {
         return found;
     }
-    let surface_bvh = &surface.bvh();
-    let mut looks = LOOKS;
+    let mut near = NearSurface::new(surface, contact);
     for pair in pairs {
-        if surface_crosses(mesh, pair, surface, surface_bvh, contact, &mut looks) {
+        if near.crosses(pair.map(|t| mesh.corners(t as usize))) {
             found.in_surface += 1;
         } else {
             found.pairs.push(pair);
@@ -54,31 +54,54 @@ pub fn crossings(mesh: &Triangulation, tree: &Bvh, surface: &Triangulation, cont
     found
 }
 
-/// Whether triangles of the surface cross or touch within the boxes of two crossing triangles of the mesh, as far as the
-/// looks that are left can tell.
-fn surface_crosses(
-    mesh: &Triangulation,
-    pair: [u32; 2],
-    surface: &Triangulation,
-    bvh: &Bvh,
+/// The surface, to be searched for triangles that cross or touch.
+struct NearSurface<'a> {
+    surface: &'a Triangulation,
+    tree: Bvh,
+    boxes: Vec<BoundingBox>,
+    /// So close to each other triangles touch.
     contact: f64,
-    looks: &mut usize,
-) -> bool {
-    let near = pair.map(|t| {
-        let mut near = Vec::new();
-        let around = BoundingBox::of(mesh.corners(t as usize));
-        around.iter().for_each(|b| bvh.overlapping(b, |s| near.push(s)));
-        near
-    });
-    let all = near[0].iter().flat_map(|s| near[1].iter().map(move |t| (*s, *t)));
-    for (s, t) in all {
-        let Some(left) = looks.checked_sub(1) else { return false };
-        *looks = left;
-        if s != t && (cross_each_other(surface, s, t) || touch(surface, s, t, contact)) {
-            return true;
-        }
+    /// Looks that are left.
+    looks: usize,
+}
+
+impl<'a> NearSurface<'a> {
+    fn new(surface: &'a Triangulation, contact: f64) -> Self {
+        let boxes: Vec<BoundingBox> = (0..surface.triangles.len()).map(|t| box_around(surface.corners(t))).collect();
+        Self { surface, tree: Bvh::new(boxes.iter().copied()), boxes, contact, looks: LOOKS }
     }
-    false
+
+    /// Whether triangles of the surface cross or touch within the boxes of two crossing triangles of the mesh, as far as
+    /// the looks that are left can tell.
+    fn crosses(&mut self, pair: [[Vec3; 3]; 2]) -> bool {
+        let near = pair.map(|corners| {
+            let mut near = Vec::new();
+            self.tree.overlapping(&box_around(corners), |s| near.push(s));
+            near
+        });
+        for s in &near[0] {
+            for t in &near[1] {
+                let Some(left) = self.looks.checked_sub(1) else { return false };
+                self.looks = left;
+                if s != t && self.cross_or_touch(*s, *t) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn cross_or_touch(&self, s: u32, t: u32) -> bool {
+        // What is farther apart than rounding can make of the contact does neither.
+        let apart = gap_between(&self.boxes[s as usize], &self.boxes[t as usize]);
+        apart <= 2.0 * self.contact && (cross_each_other(self.surface, s, t) || touch(self.surface, s, t, self.contact))
+    }
+}
+
+/// How far two boxes are apart along the axis where they are farthest apart; 0 at most where they meet.
+fn gap_between(a: &BoundingBox, b: &BoundingBox) -> f64 {
+    let along = |k: usize| larger(a.min[k] - b.max[k], b.min[k] - a.max[k]);
+    larger(larger(along(0), along(1)), along(2))
 }
 
 /// Whether two triangles that share no vertex have corners or sides that are closer than `contact` to each other.
@@ -97,42 +120,48 @@ fn touch(surface: &Triangulation, a: u32, b: u32, contact: f64) -> bool {
 
 /// Whether two triangles cross.
 fn cross_each_other(mesh: &Triangulation, a: u32, b: u32) -> bool {
-    let [s, t] = [a, b].map(|i| mesh.triangles[i as usize]);
-    let shared = s.iter().filter(|v| t.contains(v)).count();
-    let [p, q] = [a, b].map(|i| mesh.corners(i as usize));
-    match shared {
-        0 => (0..3).any(|k| pierces([p[k], p[(k + 1) % 3]], q) || pierces([q[k], q[(k + 1) % 3]], p)),
-        1 => {
-            let opposite = |t: &[_; 3], other: &[_; 3], p: [Vec3; 3]| {
-                let k = (0..3).find(|k| other.contains(&t[*k])).unwrap_or(0);
-                [p[(k + 1) % 3], p[(k + 2) % 3]]
-            };
-            pierces(opposite(&s, &t, p), q) || pierces(opposite(&t, &s, q), p)
-        }
-        _ => false,
-    }
-}
-
-/// Whether a segment passes through the inside of a triangle, beyond doubt.
-fn pierces([a, b]: [Vec3; 2], t: [Vec3; 3]) -> bool {
-    let ends = [volume(t[0], t[1], t[2], a), volume(t[0], t[1], t[2], b)];
-    if ends[0] * ends[1] >= 0 {
+    let (s, t) = (&mesh.triangles[a as usize], &mesh.triangles[b as usize]);
+    if s.iter().filter(|v| t.contains(v)).count() > 1 {
         return false;
     }
+    let (p, q) = (mesh.corners(a as usize), mesh.corners(b as usize));
+    // Where all corners of one triangle lie on one side of the other, but for a shared one, no side of either passes
+    // through the other.
+    let Some(of_p) = sides_taken(p, q, |k| t.contains(&s[k])) else { return false };
+    let Some(of_q) = sides_taken(q, p, |k| s.contains(&t[k])) else { return false };
+    let side = |p: [Vec3; 3], k: usize| [p[k], p[(k + 1) % 3]];
+    let parted = |taken: [i8; 3], k: usize| taken[k] * taken[(k + 1) % 3] < 0;
+    (0..3).any(|k| {
+        parted(of_p, k) && passes_by_inside(side(p, k), q) || parted(of_q, k) && passes_by_inside(side(q, k), p)
+    })
+}
+
+/// On which side of the plane of `t` the corners of `p` lie, 0 for those that it shares or that rounding could have put
+/// there. None where the corners that it does not share lie on one side, beyond doubt.
+#[inline]
+fn sides_taken(p: [Vec3; 3], t: [Vec3; 3], is_shared: impl Fn(usize) -> bool) -> Option<[i8; 3]> {
+    let mut taken = [0; 3];
+    let mut all = [true; 2];
+    for k in (0..3).filter(|k| !is_shared(*k)) {
+        taken[k] = volume(t[0], t[1], t[2], p[k]);
+        all = [all[0] && taken[k] > 0, all[1] && taken[k] < 0];
+    }
+    if all[0] || all[1] { None } else { Some(taken) }
+}
+
+/// Whether the line of a segment passes a triangle on the inside of all its sides, beyond doubt.
+fn passes_by_inside([a, b]: [Vec3; 2], t: [Vec3; 3]) -> bool {
     let sides = [0, 1, 2].map(|k| volume(a, b, t[k], t[(k + 1) % 3]));
     sides == [1, 1, 1] || sides == [-1, -1, -1]
 }
 
 /// The sign of the volume of a tetrahedron; 0 where rounding could have made it.
+#[inline]
 fn volume(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
     let (u, v, w) = (sub(a, d), sub(b, d), sub(c, d));
     let found = dot(u, cross(v, w));
-    let terms: f64 = (0..3)
-        .map(|k| {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            u[k].abs() * ((v[i] * w[j]).abs() + (v[j] * w[i]).abs())
-        })
-        .sum();
+    let minor = |i: usize, j: usize| (v[i] * w[j]).abs() + (v[j] * w[i]).abs();
+    let terms = u[0].abs() * minor(1, 2) + u[1].abs() * minor(2, 0) + u[2].abs() * minor(0, 1);
     if found.abs() <= ROUNDING * terms { 0 } else { found.signum() as i8 }
 }
 

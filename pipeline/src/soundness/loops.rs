@@ -41,20 +41,20 @@ fn doubled_area(polygon: &[GridPoint]) -> f64 {
     polygon.iter().zip(next).map(|(p, q)| orientation(origin, *p, *q) as f64).sum()
 }
 
-/// Two sides that share a point other than the end that neighbours have in common.
+/// The first two sides that share a point other than the end that neighbours have in common.
 fn crossing(loops: &[Vec<GridPoint>]) -> Option<[(usize, usize); 2]> {
     let sides: Vec<(usize, usize)> =
         loops.iter().enumerate().flat_map(|(l, polygon)| (0..polygon.len()).map(move |i| (l, i))).collect();
     let ends = |(l, i): (usize, usize)| [loops[l][i], loops[l][(i + 1) % loops[l].len()]];
-    let tree = Bvh::new(sides.iter().map(|s| around(ends(*s))).collect());
-    let mut found = None;
+    let tree = Bvh::new(sides.iter().map(|s| around(ends(*s))));
+    let mut first: Option<[u32; 2]> = None;
     tree.pairs(|a, b| {
         let (s, t) = (sides[a as usize], sides[b as usize]);
-        if found.is_none() && clash(ends(s), ends(t), succession(loops, s, t)) {
-            found = Some([s, t]);
+        if first.is_none_or(|first| [a, b] < first) && clash(ends(s), ends(t), succession(loops, s, t)) {
+            first = Some([a, b]);
         }
     });
-    found
+    first.map(|pair| pair.map(|side| sides[side as usize]))
 }
 
 /// How two sides follow each other in a loop.

@@ -20,6 +20,7 @@ mod distance;
 mod elements;
 mod intersect;
 mod loops;
+mod open;
 mod reference;
 mod topology;
 
@@ -28,9 +29,11 @@ pub use elements::{EdgeLengths, gamma};
 pub use reference::{HandedOverAtlas, HandedOverChart, Mesh, Triangulation};
 pub use topology::Invariants;
 
+use crate::buckets::Buckets;
 use crate::id::{ChartId, CurveId, VertexId};
 use crate::mesh::EdgeTable;
 use crate::space::Vec3;
+use covering::InPlane;
 use distance::{SurfaceDistance, uncovered};
 
 /// A part of the surface is lost if it is so many sizes away from the mesh. Flat elements of edges up to 1.4 sizes cut off
@@ -387,13 +390,14 @@ fn by_charts(
         defects.push(Defect::NoChart { label, charts: count, triangles: strays.len(), at });
     }
     let boundaries = curves::boundaries(mesh, &per_chart, atlas, ON_CURVE * diagonal);
-    let mut distance = SurfaceDistance::new(mesh.triangulation.points.len());
+    let nodes = mesh.triangulation.points.len();
+    let (mut distance, mut in_plane) = (SurfaceDistance::new(nodes), InPlane::new(nodes));
     for (id, triangles) in per_chart.iter().enumerate().map(|(c, t)| (ChartId::at(c), t)) {
         if triangles.is_empty() {
             defects.push(Defect::Empty { chart: id });
             continue;
         }
-        defects.extend(covering::check(mesh, triangles, atlas, id, &boundaries, &mut distance));
+        defects.extend(covering::check(mesh, triangles, atlas, id, &boundaries, &mut in_plane, &mut distance));
         note_mids(mesh, triangles, &atlas.charts[id.index()], &mut distance);
     }
     defects.extend(boundaries.defects);
@@ -411,15 +415,19 @@ fn note_mids(mesh: &Mesh, triangles: &[u32], chart: &HandedOverChart, distance: 
 /// Triangles that name a node twice, and copies of others.
 fn degenerate(mesh: &Triangulation) -> Option<Defect> {
     let sorted = |t: &[VertexId; 3]| {
-        let mut t = *t;
+        let mut t = t.map(|v| v.0);
         t.sort_unstable();
         t
     };
-    let mut all: Vec<([VertexId; 3], u32)> = mesh.triangles.iter().map(sorted).zip(0..).collect();
-    all.sort_unstable();
-    let copies = all.chunk_by(|a, b| a.0 == b.0).flat_map(|same| &same[1..]);
-    let mut bad: Vec<u32> = copies.map(|c| c.1).collect();
-    bad.extend(all.iter().filter(|(t, _)| t[0] == t[1] || t[1] == t[2]).map(|(_, i)| *i));
+    let all = || mesh.triangles.iter().map(sorted).zip(0_u32..).map(|([a, b, c], t)| (a, ([b, c], t)));
+    let named_twice = all().filter(|(a, ([b, c], _))| a == b || b == c).map(|(_, (_, t))| t);
+    let mut bad: Vec<u32> = named_twice.collect();
+    let mut by_least = Buckets::new(mesh.points.len(), all);
+    for node in 0..mesh.points.len() {
+        let around = by_least.get_mut(node);
+        around.sort_unstable();
+        bad.extend(around.chunk_by(|a, b| a.0 == b.0).flat_map(|same| &same[1..]).map(|copy| copy.1));
+    }
     bad.sort_unstable();
     bad.dedup();
     let first = *bad.first()?;

@@ -27,8 +27,10 @@ impl Triangulation {
     }
 
     /// The corners of a triangle in space.
+    #[inline]
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
-        self.triangles[triangle].map(|v| self.points[v.index()])
+        let [a, b, c] = self.triangles[triangle];
+        [self.points[a.index()], self.points[b.index()], self.points[c.index()]]
     }
 
     /// The area of a triangle.
@@ -48,8 +50,7 @@ impl Triangulation {
 
     /// The triangles, by where they are.
     pub fn bvh(&self) -> Bvh {
-        let triangles: Vec<[u32; 3]> = self.triangles.iter().map(|t| t.map(|v| v.0)).collect();
-        triangle_bvh(&self.points, &triangles)
+        triangle_bvh((0..self.triangles.len()).map(|t| self.corners(t)))
     }
 }
 

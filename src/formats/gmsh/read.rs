@@ -59,8 +59,9 @@ impl<'a> Section<'a> {
     fn find_after(bytes: &'a [u8], name: &'static str, at: usize) -> Result<Self, AtlasError> {
         let head = format!("\n${name}\n");
         let rest = &bytes[at..];
-        let dollars = rest.iter().enumerate().filter(|(_, b)| **b == b'$').map(|(i, _)| i);
-        let mut begins = dollars.filter_map(|i| i.checked_sub(1)).filter(|i| rest[*i..].starts_with(head.as_bytes()));
+        let mut begins = memchr::memchr_iter(b'$', rest)
+            .filter_map(|i| i.checked_sub(1))
+            .filter(|i| rest[*i..].starts_with(head.as_bytes()));
         let found = begins.next().ok_or(AtlasError::NoSection(name))?;
         Ok(Self { bytes, at: at + found + head.len(), name })
     }

@@ -81,6 +81,13 @@ pub fn number<T: std::str::FromStr>(word: Option<&[u8]>) -> Result<T, Fault> {
     number.ok_or_else(|| no_number(word))
 }
 
+/// The number that a word of a few digits is, as nearly all are: it fits all types of numbers.
+#[inline]
+fn digits(word: &[u8]) -> Option<u64> {
+    let digit = |sum: u64, byte: &u8| byte.is_ascii_digit().then(|| 10 * sum + u64::from(byte - b'0'));
+    if (1..=18).contains(&word.len()) { word.iter().try_fold(0, digit) } else { None }
+}
+
 fn no_number(word: &[u8]) -> Fault {
     if word.starts_with(b"$") {
         return Fault::Short;
@@ -96,7 +103,7 @@ fn end_of(rest: &[u8], section: &[u8], is_binary: bool) -> Option<(usize, usize)
     let stands = |at: &usize| {
         rest[*at..].starts_with(&name) && (is_binary || *at == 0 || blank(at - 1)) && blank(at + name.len())
     };
-    let at = (0..rest.len()).filter(|at| rest[*at] == b'$').find(stands)?;
+    let at = memchr::memchr_iter(b'$', rest).find(stands)?;
     Some((at, at + name.len()))
 }
 
@@ -135,12 +142,14 @@ impl<'a> Values<'a> for Text<'a> {
 
     #[inline]
     fn int(&mut self) -> Result<i64, Fault> {
-        number(self.word())
+        let word = self.word();
+        word.and_then(digits).map_or_else(|| number(word), |value| Ok(value as i64))
     }
 
     #[inline]
     fn size(&mut self) -> Result<u64, Fault> {
-        number(self.word())
+        let word = self.word();
+        word.and_then(digits).map_or_else(|| number(word), Ok)
     }
 
     #[inline]

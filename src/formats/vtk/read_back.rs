@@ -3,7 +3,7 @@
 
 use super::cell;
 use super::scalar::Scalar;
-use super::vtu::{Grid, VtuError};
+use super::vtu::{Grid, Shape, VtuError};
 use super::xml::Arrays;
 use super::xml_outline::{Field, Piece, Role, Section, outline};
 use crate::formats::{Limits, Nothing, Source};
@@ -26,22 +26,41 @@ const FIELDS: [Field; 9] = [
     Field::OfCells("area_scale"),
 ];
 
+/// The field that tells the charts of a surface.
+const CHART: [Field; 1] = [Field::OfCells("chart")];
+
 /// Reads a file that planish wrote.
 ///
 /// # Errors
 /// [`VtuError`], if anyone changed the file into one that planish would not write.
 pub fn read(bytes: &[u8]) -> Result<Grid, VtuError> {
+    columns(bytes, &FIELDS, |columns| columns.grid())
+}
+
+/// Reads the surface of a file that planish wrote, and leaves its other fields packed.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_shape(bytes: &[u8]) -> Result<Shape, VtuError> {
+    columns(bytes, &CHART, |columns| columns.shape())
+}
+
+fn columns<T>(
+    bytes: &[u8],
+    fields: &'static [Field],
+    take: impl FnOnce(&mut Columns) -> Result<T, VtuError>,
+) -> Result<T, VtuError> {
     if !bytes.starts_with(HEAD.as_bytes()) {
         return Err(VtuError::Content("the header"));
     }
     let limits = Limits::default();
     let source = Source { bytes, limits: &limits, beside: &Nothing };
-    let file = outline(bytes, limits.depth, &FIELDS)?;
+    let file = outline(bytes, limits.depth, fields)?;
     let [piece] = &file.pieces[..] else { return Err(VtuError::Content("Piece")) };
     if piece.twice.is_some() {
         return Err(VtuError::Content("an array"));
     }
-    Columns { arrays: Arrays::new(&source, &file), piece }.grid()
+    take(&mut Columns { arrays: Arrays::new(&source, &file), piece })
 }
 
 /// The arrays of the only piece of a file.
@@ -51,30 +70,35 @@ struct Columns<'a, 'p> {
 }
 
 impl Columns<'_, '_> {
-    fn grid(mut self) -> Result<Grid, VtuError> {
+    fn grid(&mut self) -> Result<Grid, VtuError> {
         let (n, m) = (self.piece.points, self.piece.cells[0]);
-        let points = self.doubles::<3>(Role::Points, "Points", n)?;
+        let Shape { points, cells, chart } = self.shape()?;
         let uv = self.doubles::<2>(Role::Field(Field::OfPoints("uv")), "uv", n)?;
         let vertex = self.integers(Field::OfPoints("vertex"), "vertex", n)?;
-        let chart = self.integers(Field::OfCells("chart"), "chart", m)?;
         let triangle = self.integers(Field::OfCells("triangle"), "triangle", m)?;
-        let fields = self.fields(m)?;
-        Ok(Grid { cells: self.cells(n, m)?, points, uv, vertex, chart, triangle, fields })
+        Ok(Grid { points, cells, uv, vertex, chart, triangle, fields: self.fields(m)? })
+    }
+
+    fn shape(&mut self) -> Result<Shape, VtuError> {
+        let (n, m) = (self.piece.points, self.piece.cells[0]);
+        let points = self.doubles::<3>(Role::Points, "Points", n)?;
+        let chart = self.integers(Field::OfCells("chart"), "chart", m)?;
+        Ok(Shape { points, cells: self.cells(n, m)?, chart })
     }
 
     /// The nodes of the cells, all of which must be 6-node triangles of existing points.
     fn cells(&mut self, points: u64, count: u64) -> Result<Vec<[u32; 6]>, VtuError> {
         let wrong = || VtuError::Content("Cells");
-        let types = self.numbers::<1>(Role::Types, "Cells", Scalar::U8, count)?;
-        let ends = self.numbers::<8>(Role::Offsets(Section::Cells), "Cells", Scalar::U64, count)?;
-        let all = count.checked_mul(6).ok_or_else(wrong)?;
-        let nodes = self.numbers::<8>(Role::Connectivity(Section::Cells), "Cells", Scalar::U64, all)?;
-        let sixes = ends.into_iter().zip(1..).all(|(end, i)| u64::from_le_bytes(end) == 6 * i);
-        let in_range = |node: [u8; 8]| u32::try_from(u64::from_le_bytes(node)).ok();
-        let nodes: Option<Vec<u32>> = nodes.into_iter().map(in_range).collect();
-        let nodes = nodes.filter(|nodes| nodes.iter().all(|node| u64::from(*node) < points)).ok_or_else(wrong)?;
-        let quadratic = types.iter().all(|[t]| *t == cell::QUADRATIC_TRIANGLE);
-        if sixes && quadratic { Ok(nodes.as_chunks().0.to_vec()) } else { Err(wrong()) }
+        let types = self.numbers(Role::Types, "Cells", Scalar::U8, count, u8::from_le_bytes)?;
+        let ends = self.numbers(Role::Offsets(Section::Cells), "Cells", Scalar::U64, count, u64::from_le_bytes)?;
+        let sixes = ends.into_iter().zip(1..).all(|(end, i)| end == 6 * i);
+        let quadratic = types.into_iter().all(|t| t == cell::QUADRATIC_TRIANGLE);
+        let all = count.checked_mul(6).filter(|_| sixes && quadratic).ok_or_else(wrong)?;
+        // What is no node is the largest number: a file has fewer points.
+        let node = |bytes| u32::try_from(u64::from_le_bytes(bytes)).unwrap_or(u32::MAX);
+        let nodes = self.numbers(Role::Connectivity(Section::Cells), "Cells", Scalar::U64, all, node)?;
+        let largest = u64::from(nodes.iter().copied().max().unwrap_or_default());
+        if largest < points || nodes.is_empty() { Ok(nodes.as_chunks().0.to_vec()) } else { Err(wrong()) }
     }
 
     fn fields(&mut self, count: u64) -> Result<Vec<CellFields>, VtuError> {
@@ -98,27 +122,27 @@ impl Columns<'_, '_> {
         count: u64,
     ) -> Result<Vec<[f64; N]>, VtuError> {
         let numbers = count.checked_mul(N as u64).ok_or(VtuError::Content(name))?;
-        let numbers: Vec<[u8; 8]> = self.numbers(role, name, Scalar::F64, numbers)?;
-        Ok(numbers.as_chunks().0.iter().map(|group| group.map(f64::from_le_bytes)).collect())
+        let numbers = self.numbers(role, name, Scalar::F64, numbers, f64::from_le_bytes)?;
+        Ok(numbers.as_chunks().0.to_vec())
     }
 
     fn integers(&mut self, field: Field, name: &'static str, count: u64) -> Result<Vec<i32>, VtuError> {
-        let numbers: Vec<[u8; 4]> = self.numbers(Role::Field(field), name, Scalar::I32, count)?;
-        Ok(numbers.into_iter().map(i32::from_le_bytes).collect())
+        self.numbers(Role::Field(field), name, Scalar::I32, count, i32::from_le_bytes)
     }
 
-    /// The bytes of exactly so many numbers of a type.
-    fn numbers<const SIZE: usize>(
+    /// Exactly so many numbers of a type, each made of its bytes by `number`.
+    fn numbers<const SIZE: usize, T>(
         &mut self,
         role: Role,
         name: &'static str,
         scalar: Scalar,
         count: u64,
-    ) -> Result<Vec<[u8; SIZE]>, VtuError> {
+        number: impl Fn([u8; SIZE]) -> T,
+    ) -> Result<Vec<T>, VtuError> {
         let array = self.piece.array(role).filter(|array| array.scalar == scalar).ok_or(VtuError::Content(name))?;
         let bytes = self.arrays.bytes_of(&array, name)?;
         let (numbers, rest) = bytes.as_chunks::<SIZE>();
         let complete = rest.is_empty() && numbers.len() as u64 == count;
-        if complete { Ok(numbers.to_vec()) } else { Err(VtuError::Content(name)) }
+        if complete { Ok(numbers.iter().map(|n| number(*n)).collect()) } else { Err(VtuError::Content(name)) }
     }
 }

@@ -1,7 +1,7 @@
 //! surface.vtu and param.vtu: written for ParaView by `vtkio`, and read again by `planish check`.
 
 use super::error::VtkError;
-pub use super::read_back::read;
+pub use super::read_back::{read, read_shape};
 use pipeline::atlas::Chart;
 use pipeline::certify::CertifiedMap;
 use pipeline::distortion::CellFields;
@@ -65,6 +65,17 @@ pub struct Grid {
     pub triangle: Vec<i32>,
     /// The fields of each cell.
     pub fields: Vec<CellFields>,
+}
+
+/// The surface in a file, without what is known of it.
+#[derive(Debug, Default, PartialEq)]
+pub struct Shape {
+    /// Positions.
+    pub points: Vec<[f64; 3]>,
+    /// Nodes of the 6-node triangles.
+    pub cells: Vec<[u32; 6]>,
+    /// Chart of each cell.
+    pub chart: Vec<i32>,
 }
 
 /// The shift of chart `index` of `count` in param.vtu: unit disks in a square grid.
