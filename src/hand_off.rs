@@ -9,6 +9,8 @@ use pipeline::evaluate::Plane;
 use pipeline::id::{ChartId, FaceId};
 use pipeline::mesh::SurfaceMesh;
 use pipeline::seams::{Curve, Passage, SeamNetwork};
+use pipeline::host::Alone;
+use pipeline::natural::{Natural, conformal, projection};
 use pipeline::space::unit_scale;
 use pipeline::spikes::spikes;
 use pipeline::subdivide::{self, LinearAtlas, subdivide};
@@ -25,6 +27,13 @@ const STRETCHED: f64 = 10.0;
 /// The same for charts that are quickly done, and whose area is scaled evenly: there MeshAdapt makes the better elements (least
 /// gamma of cad_gmsh_t13, at 2.6, by Frontal-Delaunay 0.09, by MeshAdapt 0.50; of patch_10ks, at 7.1, 0.11 and 0.35).
 const BENT: f64 = 2.0;
+
+/// Charts are projected where a hundredth of their area at most is steeper than this, as the length along a slope over that of
+/// its projection (76 degrees).
+const STEEP: f64 = 4.0;
+
+/// Charts with more triangles are not unrolled: a system as large would need memory that nobody gave to the hand-off.
+const UNROLLED: usize = 20_000;
 
 /// A chart of less than so many squares of the size is quickly done: that is 10,000 elements, a few seconds.
 const QUICK: f64 = 4_500.0;
@@ -80,7 +89,9 @@ pub fn gmsh(
     let shortest_seam_distance = network.shortest_distance(mesh);
     let mut report = HandOff { size, shortest_seam_distance, ..HandOff::default() };
     report.warning = shortest_seam_distance.filter(|d| size > 0.5 * d).map(|d| too_coarse(size, d));
-    let linear = match subdivide(mesh, charts, maps, network) {
+    let natural = natural(mesh, charts, distortions);
+    let straight: Vec<_> = natural.iter().map(|n| n.as_ref().map(|n| n.map.clone())).collect();
+    let linear = match subdivide(mesh, charts, maps, &straight, network) {
         Ok(linear) => linear,
         Err(error) => {
             let failure = failure(&error, mesh, charts);
@@ -88,7 +99,11 @@ pub fn gmsh(
             return HandedOff { files: vec![], report: HandOff { failure: Some(failure), ..report } };
         }
     };
-    let algorithms = algorithms(charts, &linear, distortions, size);
+    let mut distortions = distortions.to_vec();
+    for chart in linear.straight_charts().iter().map(|c| c.index()) {
+        distortions[chart] = natural[chart].as_ref().map_or(distortions[chart], |n| n.distortion);
+    }
+    let algorithms = algorithms(charts, &linear, &distortions, size);
     let narrow = narrow(charts, network, &algorithms.adapted, size);
     let mut spikes = spikes(mesh, charts, linear.curvatures(), size);
     let narrow_curves = narrow.iter().map(|n| n.curves.len()).sum();
@@ -103,6 +118,24 @@ pub fn gmsh(
     let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
     let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow, spikes };
     HandedOff { files: files(charts, &linear, network, &script), report }
+}
+
+/// Maps with a boundary of their own for the charts whose maps stretch, where these do less.
+fn natural(mesh: &SurfaceMesh, charts: &[Chart], distortions: &[Summary]) -> Vec<Option<Natural>> {
+    let of_chart = |(chart, on_disk): (&Chart, &Summary)| {
+        let p99 = on_disk.conformal_p99;
+        if p99 <= BENT {
+            return None;
+        }
+        let unrolled = || {
+            let is_wanted = p99 > STRETCHED && chart.triangles().len() <= UNROLLED;
+            // Where the system cannot be solved, there is the map on the disk.
+            let found = is_wanted.then(|| conformal(chart, &Alone).ok()).flatten().flatten();
+            found.filter(|n| n.distortion.conformal_p99 < p99 && n.distortion.area_ratio < EVEN)
+        };
+        projection(mesh, chart, p99.min(STEEP)).or_else(unrolled)
+    };
+    charts.iter().zip(distortions).map(of_chart).collect()
 }
 
 /// The curves along narrow places and the small charts, by the size of elements there: half of `size`, a quarter, and so on.
@@ -223,6 +256,7 @@ fn counted(report: HandOff, linear: &LinearAtlas, algorithms: &gmsh::Algorithms)
         enlarged: algorithms.enlarged,
         sub_triangles: linear.triangle_count(),
         refined: linear.refined(),
+        natural_charts: linear.straight_charts().iter().map(|c| c.0).collect(),
         linear_charts: linear.linear_charts().iter().map(|c| c.0).collect(),
         moved_vertices: linear.moved(),
         ..report

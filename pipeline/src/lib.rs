@@ -75,6 +75,7 @@ pub mod decompose;
 pub mod distortion;
 pub mod evaluate;
 pub mod linear;
+pub mod natural;
 pub mod quadratic;
 pub mod repair;
 pub mod seams;

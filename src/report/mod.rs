@@ -375,6 +375,9 @@ pub struct HandOff {
     pub sub_triangles: usize,
     /// Curved triangles that were split into other than four.
     pub refined: usize,
+    /// Charts that are handed over by a map with a boundary of its own.
+    #[serde(default)]
+    pub natural_charts: Vec<u32>,
     /// Charts that are handed over by their linear map.
     pub linear_charts: Vec<u32>,
     /// Charts that Gmsh's MeshAdapt is asked to mesh, as their maps stretch.

@@ -19,14 +19,18 @@
 
 mod arcs;
 mod incidence;
+pub(crate) mod polygons;
 mod star;
+mod straight;
 
 use crate::bernstein::{ExactDet, Validity};
 use crate::grid::GridPoint;
 use crate::id::FaceId;
 pub use arcs::Arc;
 pub use incidence::IncidenceError;
+pub use polygons::Wrong;
 pub use star::star_centre;
+pub use straight::{StraightError, StraightMap, prove_straight};
 
 /// A quadratic map as it is written: cells of six nodes (vertices, then the middles of 01, 12, 20), the places of
 /// the nodes, and a point in each hole from which the whole loop can be seen.

@@ -1,7 +1,7 @@
 //! The plane of a flat triangulation, which is a map of it as good as any other.
 
 use crate::grid::{GridPoint, orientation};
-use crate::space::{Vec3, cross, dot, norm, sub, unit_scale};
+use crate::space::{Vec3, cross, dot, norm, perpendicular, sub, unit_scale};
 
 /// A triangulation is flat where no node is further from its plane than this, relative to its extent.
 const FLAT: f64 = 1e-9;
@@ -38,7 +38,7 @@ impl Plane {
         if used().any(|p| dot(sub(p, origin), normal).abs() > FLAT * extent) {
             return None;
         }
-        let plane = Self { origin, axes: axes(normal) };
+        let plane = Self { origin, axes: perpendicular(normal) };
         let scale = unit_scale(extent);
         let turns_left = |t: &[u32; 3]| {
             let [a, b, c] = corners(t).map(|p| GridPoint::mid(plane.place(p).map(|x| x * scale)));
@@ -51,16 +51,6 @@ impl Plane {
     pub fn place(&self, x: Vec3) -> [f64; 2] {
         self.axes.map(|axis| dot(sub(x, self.origin), axis))
     }
-}
-
-/// Two directions at right angles to a unit normal and each other, which turn left around it.
-fn axes(normal: Vec3) -> [Vec3; 2] {
-    let least = (1..3).fold(0, |best, k| if normal[k].abs() < normal[best].abs() { k } else { best });
-    let mut direction = [0.0; 3];
-    direction[least] = 1.0;
-    let first = cross(direction, normal);
-    let first = first.map(|c| c / norm(first));
-    [first, cross(normal, first)]
 }
 
 #[cfg(test)]

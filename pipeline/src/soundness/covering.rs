@@ -8,10 +8,10 @@
 //! charts instead of the map that it is given.
 
 use super::curves::{Boundaries, OnCurve};
-use super::loops::{self, Wrong};
 use super::open::sides_of_one;
 use super::reference::{HandedOverAtlas, HandedOverChart, Mesh};
 use super::{Defect, SurfaceDistance};
+use crate::certify::polygons::{self, Wrong};
 use crate::evaluate::{Plane, along_curve};
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, VertexId};
@@ -129,7 +129,7 @@ fn boundary_defect(mesh: &Mesh, chart: ChartId, open: &[[VertexId; 2]], in_plane
     };
     let polygons: Vec<Vec<GridPoint>> = loops.iter().map(|l| l.iter().map(|v| in_plane.at(*v)).collect()).collect();
     let place = |l: usize, i: usize| loops.get(l).and_then(|l| l.get(i)).map_or([f64::NAN; 3], |v| at(*v));
-    loops::check(&polygons).map(|wrong| match wrong {
+    polygons::check(&polygons).map(|wrong| match wrong {
         Wrong::Crossing([(l, i), _]) => Defect::BoundaryCrosses { chart, at: place(l, i) },
         Wrong::Outer(l) | Wrong::Nesting(l) => Defect::BoundaryNested { chart, at: place(l, 0) },
     })

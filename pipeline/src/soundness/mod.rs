@@ -3,7 +3,7 @@
 //! *Faithful*: nothing is lost, doubled, folded or torn. Where the file tells in which chart each triangle was made, this
 //! is shown chart by chart, in the map that the mesher used: every triangle is positive (`covering`), the open edges
 //! of the chart's mesh run along its curves, each of them whole (`curves`), and the loops that they form are simple
-//! and rightly nested (`loops`), so that the chart is covered once. Whether the file tells charts or not, the mesh has
+//! and rightly nested, so that the chart is covered once. Whether the file tells charts or not, the mesh has
 //! the invariants of the surface (`topology`), its nodes lie on the surface, no part of the surface is farther from it
 //! than little more than an edge, its area is that of the surface but for what flat elements cut off, and no two triangles
 //! cross that do not in the surface (`intersect`). Elements of six nodes are valid.
@@ -19,7 +19,6 @@ mod curves;
 mod distance;
 mod elements;
 mod intersect;
-mod loops;
 mod open;
 mod reference;
 mod topology;

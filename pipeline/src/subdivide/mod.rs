@@ -1,5 +1,8 @@
 //! Subdivide: certified quadratic maps -> a linear triangulation that a mesher can remesh through.
 //!
+//! Charts that are nearly planes come with their projection, which is certified, too, and keeps the shape of their boundary.
+//! Others are handed over by their quadratic map.
+//!
 //! Every curved triangle becomes four straight ones between its six nodes; in space, mid-edge nodes lie in the
 //! middle of straight edges. A curved triangle can be valid although one of the four is not: there it is refined
 //! until all are positive, decided exactly on the numbers that are kept. Where that would take too many
@@ -21,7 +24,7 @@ mod refine;
 
 use crate::CertifiedChart;
 use crate::atlas::Chart;
-use crate::certify::{CertifiedMap, PlanarMap, prove};
+use crate::certify::{CertifiedMap, PlanarMap, StraightMap, prove};
 use crate::curvature::Principal;
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, CurveId, FaceId, VertexId};
@@ -39,6 +42,7 @@ pub struct LinearAtlas {
     curvatures: Vec<Principal>,
     charts: Vec<LinearChart>,
     curves: Vec<Vec<u32>>,
+    straight: Vec<ChartId>,
     linear: Vec<ChartId>,
     refined: usize,
     moved: usize,
@@ -125,6 +129,11 @@ impl LinearAtlas {
         self.charts.iter().map(|c| c.triangles.len()).sum()
     }
 
+    /// The charts that are handed over by the map that was given for them.
+    pub fn straight_charts(&self) -> &[ChartId] {
+        &self.straight
+    }
+
     /// The charts that are handed over by their linear map.
     pub fn linear_charts(&self) -> &[ChartId] {
         &self.linear
@@ -163,40 +172,49 @@ impl LinearChart {
     }
 }
 
-/// Turns `maps`, those of `charts`, in order, into linear triangulations.
+/// Turns `maps`, those of `charts`, in order, into linear triangulations. Charts with a map in `straight` are handed over by
+/// that one, if it can be.
 ///
 /// # Errors
 /// [`Error`]: this surface cannot be handed over in this form; the maps are none the worse.
 ///
 /// # Panics
-/// If `maps` and `network` are not those of `charts`.
+/// If `maps`, `straight` and `network` are not those of `charts`.
 pub fn subdivide(
     mesh: &SurfaceMesh,
     charts: &[Chart],
     maps: &[CertifiedChart],
+    straight: &[Option<StraightMap>],
     network: &SeamNetwork,
 ) -> Result<LinearAtlas, Error> {
-    assert_eq!(charts.len(), maps.len(), "a map for every chart");
+    assert_eq!([maps.len(), straight.len()], [charts.len(); 2], "maps for every chart");
     refuse_self_contact(network, charts.len())?;
-    let split = split(mesh, charts, maps, network)?;
-    let Split { nodes, charts, linear, refined } = split;
+    let split = split(mesh, charts, maps, straight, network)?;
+    let Split { nodes, charts, by, refined } = split;
+    let those = |which: &dyn Fn(HandedOver) -> bool| {
+        (0..by.len()).filter(|c| which(by[*c])).map(ChartId::at).collect::<Vec<ChartId>>()
+    };
+    let straight = those(&|by| by == HandedOver::Straight);
+    let linear = those(&|by| matches!(by, HandedOver::Start | HandedOver::Chords));
     let mut points = nodes.positions(mesh);
     let moved = normals::separate(&mut points, &charts, mesh.bounding_box().diagonal())?;
     let curves = network.curves().iter().map(|c| nodes.along(c)).collect();
-    Ok(LinearAtlas { curvatures: nodes.curvatures(mesh), points, charts, curves, linear, refined, moved })
+    Ok(LinearAtlas { curvatures: nodes.curvatures(mesh), points, charts, curves, straight, linear, refined, moved })
 }
 
 /// Charts whose triangles all turn left, and how they came about.
 struct Split {
     nodes: Nodes,
     charts: Vec<LinearChart>,
-    linear: Vec<ChartId>,
+    by: Vec<HandedOver>,
     refined: usize,
 }
 
 /// By which of its maps a chart is handed over, from the best to the plainest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum HandedOver {
+    /// A map by straight triangles that was given for it.
+    Straight,
     /// The certified map.
     Certified,
     /// The map from which untangling started: straight triangles, arcs along the boundary.
@@ -205,29 +223,54 @@ enum HandedOver {
     Chords,
 }
 
+/// A proven map of a chart.
+enum Proven<'a> {
+    Straight(&'a StraightMap),
+    Quadratic(Cow<'a, CertifiedMap>),
+}
+
+impl Proven<'_> {
+    fn map(&self) -> &PlanarMap {
+        match self {
+            Self::Straight(map) => map.map(),
+            Self::Quadratic(map) => map.map(),
+        }
+    }
+}
+
 /// Splits the triangles of all charts. A chart that needs too many parts gets a plainer map, and all begins again: at
-/// most twice for each chart.
-fn split(mesh: &SurfaceMesh, charts: &[Chart], maps: &[CertifiedChart], network: &SeamNetwork) -> Result<Split, Error> {
-    let mut chosen: Vec<Cow<CertifiedMap>> = maps.iter().map(|m| Cow::Borrowed(&m.certified)).collect();
-    let mut by = vec![HandedOver::Certified; maps.len()];
+/// most three times for each chart.
+fn split(
+    mesh: &SurfaceMesh,
+    charts: &[Chart],
+    maps: &[CertifiedChart],
+    straight: &[Option<StraightMap>],
+    network: &SeamNetwork,
+) -> Result<Split, Error> {
+    let certified = |c: usize| Proven::Quadratic(Cow::Borrowed(&maps[c].certified));
+    let first = |c: usize| match &straight[c] {
+        Some(map) => (HandedOver::Straight, Proven::Straight(map)),
+        None => (HandedOver::Certified, certified(c)),
+    };
+    let (mut by, mut chosen): (Vec<HandedOver>, Vec<Proven>) = (0..charts.len()).map(first).unzip();
     loop {
         let mut nodes = Nodes::new(mesh, network, charts);
+        let current: Vec<&PlanarMap> = chosen.iter().map(Proven::map).collect();
         let mut split: Vec<LinearChart> =
-            charts.iter().zip(&chosen).map(|(c, m)| quartered(mesh, c, m, &nodes)).collect();
-        let current: Vec<&CertifiedMap> = chosen.iter().map(AsRef::as_ref).collect();
+            charts.iter().zip(&current).map(|(c, m)| quartered(mesh, c, m, &nodes)).collect();
         let failed = match refine::refine(refine::DEPTH, mesh, charts, &current, &mut nodes, &mut split) {
-            Ok(refined) => {
-                let is_linear = |c: &usize| by[*c] != HandedOver::Certified;
-                let linear = (0..charts.len()).filter(is_linear).map(ChartId::at).collect();
-                return Ok(Split { nodes, charts: split, linear, refined });
-            }
+            Ok(refined) => return Ok(Split { nodes, charts: split, by, refined }),
             Err(failed) => failed,
         };
         for (chart, inverted) in blamed(failed, &by, network, &nodes)? {
             let start = &maps[chart].start;
             (by[chart], chosen[chart]) = match by[chart] {
-                HandedOver::Certified => (HandedOver::Start, Cow::Borrowed(start)),
-                _ => (HandedOver::Chords, Cow::Owned(with_chords(start).ok_or(inverted)?)),
+                HandedOver::Straight => (HandedOver::Certified, certified(chart)),
+                HandedOver::Certified => (HandedOver::Start, Proven::Quadratic(Cow::Borrowed(start))),
+                HandedOver::Start | HandedOver::Chords => {
+                    let chords = with_chords(start).ok_or(inverted)?;
+                    (HandedOver::Chords, Proven::Quadratic(Cow::Owned(chords)))
+                }
             };
         }
     }
@@ -327,8 +370,7 @@ fn refuse_self_contact(network: &SeamNetwork, charts: usize) -> Result<(), Error
 }
 
 /// Every triangle split into four, between corners and mid-edge nodes.
-fn quartered(mesh: &SurfaceMesh, chart: &Chart, map: &CertifiedMap, nodes: &Nodes) -> LinearChart {
-    let map = map.map();
+fn quartered(mesh: &SurfaceMesh, chart: &Chart, map: &PlanarMap, nodes: &Nodes) -> LinearChart {
     assert_eq!(map.nodes.len(), chart.vertices().len() + chart.edges().len(), "the map of this chart");
     let parts = |[a, b, c, ab, bc, ca]: [u32; 6]| [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
     LinearChart {

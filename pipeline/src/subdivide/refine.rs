@@ -18,7 +18,7 @@
 use super::nodes::{Nodes, on_surface};
 use super::{Inverted, LinearChart};
 use crate::atlas::Chart;
-use crate::certify::CertifiedMap;
+use crate::certify::PlanarMap;
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, FaceId, HalfEdgeId};
 use crate::mesh::SurfaceMesh;
@@ -53,7 +53,7 @@ pub(super) fn refine(
     depth: u32,
     mesh: &SurfaceMesh,
     charts: &[Chart],
-    maps: &[&CertifiedMap],
+    maps: &[&PlanarMap],
     nodes: &mut Nodes,
     linear: &mut [LinearChart],
 ) -> Result<usize, Vec<Inverted>> {
@@ -74,7 +74,7 @@ pub(super) fn refine(
 struct Refiner<'a> {
     mesh: &'a SurfaceMesh,
     charts: &'a [Chart],
-    maps: &'a [&'a CertifiedMap],
+    maps: &'a [&'a PlanarMap],
     nodes: &'a mut Nodes,
     linear: &'a mut [LinearChart],
     /// Triangles of the surface to be looked at again, and those that were looked at.
@@ -94,7 +94,7 @@ impl<'a> Refiner<'a> {
     fn new(
         mesh: &'a SurfaceMesh,
         charts: &'a [Chart],
-        maps: &'a [&'a CertifiedMap],
+        maps: &'a [&'a PlanarMap],
         nodes: &'a mut Nodes,
         linear: &'a mut [LinearChart],
     ) -> Self {
@@ -130,7 +130,7 @@ impl<'a> Refiner<'a> {
     /// The four parts of a triangle of the surface.
     fn quarters(&self, face: u32) -> [Part; 4] {
         let (chart, local) = self.owner[face as usize];
-        let cell = self.maps[chart as usize].map().cells[local as usize];
+        let cell = self.maps[chart as usize].cells[local as usize];
         let nodes = &self.linear[chart as usize].nodes;
         let (one, half) = (1 << BITS, 1 << (BITS - 1));
         let corner = |k: usize, at: [i64; 3]| Corner { node: nodes[cell[k] as usize], at };
@@ -217,7 +217,7 @@ impl<'a> Refiner<'a> {
 
     fn place(&self, face: u32, at: [i64; 3]) -> GridPoint {
         let (chart, local) = self.owner[face as usize];
-        let map = self.maps[chart as usize].map();
+        let map = self.maps[chart as usize];
         place(map.cells[local as usize].map(|n| map.nodes[n as usize]), at)
     }
 
@@ -237,7 +237,7 @@ impl<'a> Refiner<'a> {
 
     /// A chart with the given triangles, ascending, refined.
     fn replaced(&self, chart: usize, faces: &[u32]) -> LinearChart {
-        let (old, cells) = (&self.linear[chart], &self.maps[chart].map().cells);
+        let (old, cells) = (&self.linear[chart], &self.maps[chart].cells);
         let kept = old.triangles.iter().zip(&old.faces).filter(|(_, f)| faces.binary_search(f).is_err());
         let (triangles, of) = kept.map(|(t, f)| (*t, *f)).unzip();
         let mut fresh = LinearChart { nodes: old.nodes.clone(), uv: old.uv.clone(), triangles, faces: of };

@@ -11,6 +11,7 @@ struct Sample {
     mesh: SurfaceMesh,
     atlas: Atlas,
     maps: Vec<CertifiedChart>,
+    straight: Vec<Option<StraightMap>>,
     network: SeamNetwork,
 }
 
@@ -18,13 +19,14 @@ impl Sample {
     fn new(soup: &TriangleSoup, label: impl Fn(Vec3) -> u32) -> Self {
         let (mesh, atlas) = labelled(soup, label);
         let certified = |c| finish_chart(map_chart(c, Order::Quadratic).expect("maps"));
-        let maps = atlas.charts().iter().map(certified).collect();
+        let maps: Vec<CertifiedChart> = atlas.charts().iter().map(certified).collect();
+        let straight = vec![None; maps.len()];
         let network = SeamNetwork::new(&mesh, atlas.charts());
-        Self { mesh, atlas, maps, network }
+        Self { mesh, atlas, maps, straight, network }
     }
 
     fn subdivide(&self) -> Result<LinearAtlas, Error> {
-        subdivide(&self.mesh, self.atlas.charts(), &self.maps, &self.network)
+        subdivide(&self.mesh, self.atlas.charts(), &self.maps, &self.straight, &self.network)
     }
 
     /// Subdivides, and looks at all that is promised.
@@ -99,6 +101,28 @@ fn a_chart_that_needs_too_many_parts_is_handed_over_by_its_linear_map() {
     let linear = sample.verified();
     assert!(linear.linear_charts().contains(&ChartId(0)), "{:?}", linear.linear_charts());
     assert!(linear.triangle_count() < 8 * sample.mesh.triangles().len());
+}
+
+#[test]
+fn a_chart_is_handed_over_by_its_projection_where_there_is_one() {
+    let plate = shapes::disk_with_holes(13, 2);
+    let flat = plate.points().iter().map(|[x, y, _]| [*x, *y, 0.5 * x]).collect();
+    let flat = TriangleSoup::new(flat, plate.triangles().to_vec()).expect("sound");
+    let mut sample = Sample::new(&flat, |p| u32::from(p[0] > 0.1));
+    let charts = sample.atlas.charts();
+    sample.straight =
+        charts.iter().map(|c| crate::natural::projection(&sample.mesh, c, 4.0).map(|p| p.map)).collect();
+    let linear = sample.verified();
+    assert_eq!((linear.straight_charts().len(), linear.refined()), (sample.atlas.charts().len(), 0));
+    for chart in linear.charts() {
+        let scale = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|n| chart.uv()[n as usize]);
+            let corners = t.map(|n| linear.points()[chart.nodes()[n as usize] as usize]);
+            orientation(a, b, c) as f64 / crate::space::triangle_area(corners)
+        };
+        let first = scale(&chart.triangles()[0]);
+        assert!(chart.triangles().iter().all(|t| (scale(t) / first - 1.0).abs() < 1e-9), "the plane as it is");
+    }
 }
 
 /// A valid curved triangle whose straight part between its third corner and the middles beside it is inverted: the
@@ -179,7 +203,7 @@ fn charts_too_thin_to_be_halved_make_their_neighbours_plainer() {
 /// How many parts of the first chart are inverted when every triangle is split into four.
 fn quartered_inverted_parts(sample: &Sample) -> usize {
     let nodes = Nodes::new(&sample.mesh, &sample.network, sample.atlas.charts());
-    let chart = quartered(&sample.mesh, &sample.atlas.charts()[0], &sample.maps[0].certified, &nodes);
+    let chart = quartered(&sample.mesh, &sample.atlas.charts()[0], sample.maps[0].certified.map(), &nodes);
     chart.triangles.iter().filter(|t| !chart.turns_left(**t)).count()
 }
 
@@ -187,7 +211,7 @@ fn quartered_inverted_parts(sample: &Sample) -> usize {
 fn refinement_that_may_not_go_deep_enough_names_the_triangle() {
     let sample = tetrahedron([false, true, false, false]);
     let charts = sample.atlas.charts();
-    let maps: Vec<&CertifiedMap> = sample.maps.iter().map(|m| &m.certified).collect();
+    let maps: Vec<&PlanarMap> = sample.maps.iter().map(|m| m.certified.map()).collect();
     let mut nodes = Nodes::new(&sample.mesh, &sample.network, charts);
     let mut linear: Vec<LinearChart> =
         charts.iter().zip(&maps).map(|(c, m)| quartered(&sample.mesh, c, m, &nodes)).collect();
@@ -217,7 +241,7 @@ fn triangles_without_a_normal_get_one_and_others_stay() {
 /// How many parts of the first chart have no area when every triangle is split into four.
 fn flat_quartered_parts(sample: &Sample) -> usize {
     let nodes = Nodes::new(&sample.mesh, &sample.network, sample.atlas.charts());
-    let chart = quartered(&sample.mesh, &sample.atlas.charts()[0], &sample.maps[0].certified, &nodes);
+    let chart = quartered(&sample.mesh, &sample.atlas.charts()[0], sample.maps[0].certified.map(), &nodes);
     let points = nodes.positions(&sample.mesh);
     let corners = |t: &[u32; 3]| t.map(|n| points[chart.nodes[n as usize] as usize]);
     chart.triangles.iter().filter(|t| crate::space::triangle_area(corners(t)) == 0.0).count()

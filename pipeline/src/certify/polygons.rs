@@ -1,4 +1,4 @@
-//! Are the boundary loops of a chart in the plane simple and rightly nested? Decided exactly, on the grid.
+//! Are the boundary loops of a map by straight triangles simple and rightly nested? Decided exactly, on the grid.
 //!
 //! With every triangle positive, such loops are all that the theorem of [`crate::certify`] asks for: the number of
 //! preimages of a point is its winding number about the loops, which is 1 inside the outer one and outside the holes,

@@ -1,0 +1,160 @@
+//! Maps by straight triangles, whatever the shape of their boundary.
+//!
+//! The theorem of [`crate::certify`] with (c) and (d) replaced by: the loops are simple polygons, one around all others, and
+//! none of these inside another. Then the winding number about them is 1 inside the outer one and outside the others, and 0
+//! elsewhere, and the same argument holds.
+
+use super::polygons::{self, Wrong};
+use super::{Error, IncidenceError, PlanarMap, incidence, refuse_inexact};
+use crate::grid::{GridPoint, orientation};
+use crate::id::FaceId;
+
+/// A map by straight triangles that is proven to be one-to-one. Made by [`prove_straight`] only.
+#[derive(Clone, Debug)]
+pub struct StraightMap {
+    map: PlanarMap,
+}
+
+impl StraightMap {
+    /// The map: mid-edge nodes lie in the middle of their edges.
+    pub fn map(&self) -> &PlanarMap {
+        &self.map
+    }
+}
+
+/// Why a map by straight triangles is not proven.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StraightError {
+    /// The cells are no surface with boundary.
+    #[error(transparent)]
+    Incidence(#[from] IncidenceError),
+    /// A node is no double, or off the grid.
+    #[error(transparent)]
+    Node(Error),
+    /// A node is not in the middle of its edge.
+    #[error("node {node} is not in the middle of its edge")]
+    Curved {
+        /// The node.
+        node: u32,
+    },
+    /// Triangles are folded, or have no area.
+    #[error("{count} triangles do not turn left (first: {first})")]
+    Folded {
+        /// How many.
+        count: usize,
+        /// The first of them.
+        first: FaceId,
+    },
+    /// The boundary crosses or touches itself, or its loops do not lie as those of a disk with holes.
+    #[error("the boundary is not that of a disk with holes: {0:?}")]
+    Boundary(Wrong),
+}
+
+/// Proves that a map by straight triangles is one-to-one.
+///
+/// # Errors
+/// The first premise that fails, with its evidence.
+pub fn prove_straight(map: PlanarMap) -> Result<StraightMap, StraightError> {
+    let loops = incidence::boundary_loops(&map.cells, map.nodes.len())?;
+    refuse_inexact(&map).map_err(StraightError::Node)?;
+    let at = |n: u32| map.nodes[n as usize];
+    if let Some(node) = map.cells.iter().flat_map(|c| &c[..3]).copied().find(|n| !at(*n).is_vertex()) {
+        return Err(StraightError::Node(Error::OffGrid { node }));
+    }
+    if let Some(node) = map.cells.iter().find_map(|c| bent(c.map(|n| (n, at(n))))) {
+        return Err(StraightError::Curved { node });
+    }
+    let turns_left = |c: &[u32; 6]| orientation(at(c[0]), at(c[1]), at(c[2])) > 0;
+    let mut folded = (0..map.cells.len()).filter(|f| !turns_left(&map.cells[*f]));
+    if let Some(first) = folded.next() {
+        return Err(StraightError::Folded { count: 1 + folded.count(), first: FaceId::at(first) });
+    }
+    let polygons: Vec<Vec<GridPoint>> =
+        loops.iter().map(|l| l.iter().map(|[from, ..]| at(*from)).collect()).collect();
+    match polygons::check(&polygons) {
+        Some(wrong) => Err(StraightError::Boundary(wrong)),
+        None => Ok(StraightMap { map }),
+    }
+}
+
+/// The first mid-edge node of a triangle that is not in the middle.
+fn bent(nodes: [(u32, GridPoint); 6]) -> Option<u32> {
+    let middle = |k: usize| nodes[k].1.midpoint(nodes[(k + 1) % 3].1);
+    (0..3).find(|k| nodes[3 + k].1 != middle(*k)).map(|k| nodes[3 + k].0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An L of two squares, each of two triangles, with the corners at these places.
+    fn map(corners: [[f64; 2]; 6]) -> PlanarMap {
+        let triangles = [[0, 1, 2], [0, 2, 3], [3, 2, 4], [3, 4, 5]];
+        let mut nodes: Vec<GridPoint> = corners.map(GridPoint::vertex).to_vec();
+        let mut edges: Vec<[usize; 2]> = Vec::new();
+        let mut cells = Vec::new();
+        for t in triangles {
+            let mids = [0, 1, 2].map(|k| {
+                let edge: [usize; 2] = [t[k], t[(k + 1) % 3]];
+                let known = edges.iter().position(|e| *e == edge || *e == [edge[1], edge[0]]);
+                6 + known.unwrap_or_else(|| {
+                    edges.push(edge);
+                    nodes.push(nodes[edge[0]].midpoint(nodes[edge[1]]));
+                    edges.len() - 1
+                })
+            });
+            cells.push([t[0], t[1], t[2], mids[0], mids[1], mids[2]].map(|n| n as u32));
+        }
+        PlanarMap { cells, nodes, hole_centres: vec![] }
+    }
+
+    const BENT: [[f64; 2]; 6] = [[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5], [0.25, 0.75], [-0.5, 0.5]];
+
+    #[test]
+    fn an_l_is_proven_although_it_is_not_convex_and_its_broken_twins_are_not() {
+        assert!(prove_straight(map(BENT)).is_ok());
+        let mut folded = BENT;
+        folded[4] = [0.25, 0.25];
+        assert_eq!(prove_straight(map(folded)).err(), Some(StraightError::Folded { count: 2, first: FaceId(2) }));
+        let mut curved = map(BENT);
+        curved.nodes[6].x += 1;
+        assert_eq!(prove_straight(curved).err(), Some(StraightError::Curved { node: 6 }));
+        let mut off = map(BENT);
+        off.nodes[1].y += 1;
+        assert_eq!(prove_straight(off).err(), Some(StraightError::Node(Error::OffGrid { node: 1 })));
+    }
+
+    #[test]
+    fn a_spiral_that_covers_itself_is_not_proven_although_nothing_is_folded() {
+        // A strip of squares that goes around a square hole, and on over its own beginning.
+        let ring = |k: usize| [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][k % 4];
+        for (turns, is_proven) in [(3, true), (4, false), (5, false)] {
+            let corner = |k: usize, r: f64| ring(k).map(|c| GridPoint::vertex([c * r, 0.0]).uv()[0]);
+            let mut nodes: Vec<GridPoint> = Vec::new();
+            for k in 0..=turns {
+                nodes.extend([0.25, 0.75].map(|r| GridPoint::vertex(corner(k, r))));
+            }
+            let vertices = nodes.len();
+            let mut cells = Vec::new();
+            let mut edges: Vec<[usize; 2]> = Vec::new();
+            for k in 0..turns {
+                let [a, b, c, d] = [2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2];
+                for t in [[a, b, c], [a, c, d]] {
+                    let mids = [0, 1, 2].map(|i| {
+                        let edge = [t[i].min(t[(i + 1) % 3]), t[i].max(t[(i + 1) % 3])];
+                        vertices
+                            + edges.iter().position(|e| *e == edge).unwrap_or_else(|| {
+                                edges.push(edge);
+                                nodes.push(nodes[edge[0]].midpoint(nodes[edge[1]]));
+                                edges.len() - 1
+                            })
+                    });
+                    cells.push([t[0], t[1], t[2], mids[0], mids[1], mids[2]].map(|n| n as u32));
+                }
+            }
+            let proven = prove_straight(PlanarMap { cells, nodes, hole_centres: vec![] });
+            assert_eq!(proven.is_ok(), is_proven, "{turns}: {:?}", proven.err());
+            assert!(is_proven || matches!(proven, Err(StraightError::Boundary(Wrong::Crossing(_)))));
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Maps by straight triangles whose boundary keeps, more or less, the shape that it has in space.
+//!
+//! A disk makes every corner of a boundary a singularity, and stretches what is long: conformal distortions of 100 to 6,000 on
+//! the flat sides of CAD parts, and a mesher loses parts of such charts. Two maps do without a disk:
+//!
+//! - [`projection`]: along the mean of the normals, for what is nearly a plane;
+//! - [`conformal`]: least squares conformal (Levy, Petitjean, Ray and Maillot 2002, *Least squares conformal maps*, doi
+//!   10.1145/566654.566590; the energy as in Mullen, Tong, Alliez and Desbrun 2008, doi 10.1111/j.1467-8659.2008.01289.x), with
+//!   a free boundary: what can be unrolled without stretching is.
+//!
+//! Neither is one-to-one by construction. What the certifier does not prove is no [`Natural`].
+
+mod conformal;
+mod projection;
+
+use crate::atlas::Chart;
+use crate::certify::{PlanarMap, StraightMap, prove_straight};
+use crate::distortion::{Summary, summary_of};
+use crate::grid::GridPoint;
+use crate::id::{FaceId, HalfEdgeId};
+pub use conformal::conformal;
+pub use projection::projection;
+
+/// Maps are scaled into a disk of this radius: well within what the grid holds exactly.
+const RADIUS: f64 = 0.984375;
+
+/// A map with a boundary of its own that is proven to be one-to-one.
+#[derive(Clone, Debug)]
+pub struct Natural {
+    /// The map.
+    pub map: StraightMap,
+    /// How much it stretches.
+    pub distortion: Summary,
+}
+
+/// The map with the vertices of a chart at `places`, scaled to fit and rounded to the grid; none where it is not one-to-one.
+fn certified(chart: &Chart, places: &[[f64; 2]]) -> Option<Natural> {
+    let map = prove_straight(straight(chart, &fitted(places)?)).ok()?;
+    let distortion = summary_of(chart, map.map());
+    Some(Natural { map, distortion })
+}
+
+/// Places moved and scaled into a disk of [`RADIUS`] around the origin; none where they all are one, or not finite.
+fn fitted(places: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+    let bound = |k: usize, f: fn(f64, f64) -> f64, start| places.iter().map(|p| p[k]).fold(start, f);
+    let least = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
+    let most = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
+    let half = 0.5 * (most[0] - least[0]).hypot(most[1] - least[1]);
+    let scale = RADIUS / half;
+    let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (least[k] + most[k])) * scale);
+    (scale.is_finite() && scale > 0.0).then(|| places.iter().map(moved).collect())
+}
+
+/// The map by straight triangles with the vertices at `places`, rounded to the grid. Nodes: the vertices of the chart, then
+/// its edges.
+fn straight(chart: &Chart, places: &[[f64; 2]]) -> PlanarMap {
+    let vertices = places.len();
+    let mut nodes: Vec<GridPoint> = places.iter().map(|p| GridPoint::vertex(*p)).collect();
+    nodes.resize(vertices + chart.edges().len(), GridPoint::default());
+    let mut cells = Vec::with_capacity(chart.triangles().len());
+    for (f, t) in chart.triangles().iter().enumerate() {
+        let mids = [0, 1, 2].map(|side| {
+            let edge = vertices + chart.edges().edge(HalfEdgeId::side_of(FaceId::at(f), side)).index();
+            nodes[edge] = nodes[t[side].index()].midpoint(nodes[t[(side + 1) % 3].index()]);
+            edge as u32
+        });
+        cells.push([t[0].0, t[1].0, t[2].0, mids[0], mids[1], mids[2]]);
+    }
+    PlanarMap { cells, nodes, hole_centres: vec![] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::host::Alone;
+    use crate::mesh::{SurfaceMesh, TriangleSoup};
+    use crate::space::Vec3;
+    use crate::{decompose, repair, shapes};
+
+    fn charts(soup: &TriangleSoup) -> (SurfaceMesh, Vec<Chart>) {
+        let mesh = repair(soup, &Default::default()).expect("repairs").mesh;
+        let no_features = decompose::Settings { feature_angle: None, ..Default::default() };
+        let atlas = decompose(&mesh, &no_features, &Alone).expect("decomposes");
+        (mesh, atlas.into_charts())
+    }
+
+    fn moved(soup: &TriangleSoup, to: impl Fn(Vec3) -> Vec3) -> TriangleSoup {
+        let points = soup.points().iter().map(|p| to(*p)).collect();
+        TriangleSoup::new(points, soup.triangles().to_vec()).expect("sound")
+    }
+
+    #[test]
+    fn a_plate_with_holes_is_projected_as_it_is_and_a_dome_as_far_as_it_is_flat() {
+        let flat = moved(&shapes::disk_with_holes(13, 2), |[x, y, _]| [5.0 + 0.6 * x, y, -0.8 * x]);
+        let (mesh, plate) = charts(&flat);
+        let of_plate = projection(&mesh, &plate[0], 1.1).expect("it is flat").distortion;
+        assert!((of_plate.conformal_p99 - 1.0).abs() < 1e-9 && (of_plate.area_ratio - 1.0).abs() < 1e-9, "{of_plate:?}");
+        let (mesh, dome) = charts(&shapes::disk(8));
+        let steep = projection(&mesh, &dome[0], 4.0).expect("hardly bent").distortion.conformal_p99;
+        assert!(steep > 1.05, "{steep}");
+        assert!(projection(&mesh, &dome[0], 0.99 * steep).is_none(), "the bound holds");
+    }
+
+    #[test]
+    fn a_bent_strip_is_unrolled_and_not_projected() {
+        // A rectangle, 8 by 1, rolled over three quarters of a turn.
+        let (n, m) = (32, 4);
+        let at = |i: u32, j: u32| i * (m + 1) + j;
+        let point = |k: u32| {
+            let turn = 1.5 * std::f64::consts::PI * f64::from(k / (m + 1)) / f64::from(n);
+            let radius = 8.0 / (1.5 * std::f64::consts::PI);
+            [radius * turn.cos(), radius * turn.sin(), f64::from(k % (m + 1)) / f64::from(m)]
+        };
+        let points = (0..(n + 1) * (m + 1)).map(point).collect();
+        let quads = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
+        let halves = |(i, j): (u32, u32)| {
+            [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+        };
+        let soup = TriangleSoup::new(points, quads.flat_map(halves).collect()).expect("sound");
+        let (mesh, strip) = charts(&soup);
+        assert!(projection(&mesh, &strip[0], f64::MAX).is_none(), "it turns back");
+        let unrolled = conformal(&strip[0], &Alone).expect("unrolled").expect("one-to-one").distortion;
+        assert!((unrolled.conformal_p99 - 1.0).abs() < 1e-6 && unrolled.area_ratio < 1.0 + 1e-6, "{unrolled:?}");
+    }
+
+    #[test]
+    fn what_covers_itself_when_unrolled_is_no_map() {
+        // A ramp of two turns: flat, it lies on itself.
+        let (n, turns) = (64, 2.0);
+        let point = |k: u32| {
+            let (turn, radius) = (std::f64::consts::TAU * turns * f64::from(k / 2) / f64::from(n), 1.0 + f64::from(k % 2));
+            [radius * turn.cos(), radius * turn.sin(), 0.05 * turn]
+        };
+        let points = (0..2 * (n + 1)).map(point).collect();
+        let halves = |i: u32| [[2 * i, 2 * i + 1, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 2]];
+        let soup = TriangleSoup::new(points, (0..n).flat_map(halves).collect()).expect("sound");
+        let (mesh, ramp) = charts(&soup);
+        assert_eq!(ramp.len(), 1);
+        assert!(projection(&mesh, &ramp[0], f64::MAX).is_none());
+        assert!(conformal(&ramp[0], &Alone).expect("solved").is_none());
+    }
+
+    #[test]
+    fn a_hemisphere_is_mapped_conformally() {
+        let (_, halves) = charts(&shapes::sphere(12));
+        let of = conformal(&halves[0], &Alone).expect("solved").expect("one-to-one").distortion;
+        assert!(of.conformal_p99 < 1.6, "{of:?}");
+    }
+}

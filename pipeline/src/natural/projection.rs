@@ -1,0 +1,41 @@
+//! The orthogonal projection of a chart.
+//!
+//! Where all normals lie within an angle a of one direction, the projection along it turns every triangle left, and no
+//! conformal distortion is above 1 / cos a.
+
+use super::{Natural, certified};
+use crate::atlas::Chart;
+use crate::distortion::quantiles;
+use crate::mesh::SurfaceMesh;
+use crate::space::{Vec3, cross, dot, norm, perpendicular, sub};
+
+/// The projection of `chart`, one of `mesh`, along the mean of its normals; none where that is not one-to-one, or the
+/// conformal distortion of a hundredth of the area is above `most`.
+pub fn projection(mesh: &SurfaceMesh, chart: &Chart, most: f64) -> Option<Natural> {
+    let normals: Vec<Vec3> = chart.faces().iter().map(|f| doubled_normal(mesh.corners(f.index()))).collect();
+    let mut sum = [0.0; 3];
+    normals.iter().for_each(|n| (0..3).for_each(|k| sum[k] += n[k]));
+    let length = norm(sum);
+    if !(length.is_finite() && length > 0.0) {
+        return None;
+    }
+    let axis = sum.map(|c| c / length);
+    let steepness = |n: &Vec3| {
+        let (area, projected) = (norm(*n), dot(*n, axis));
+        (if projected > 0.0 { area / projected } else { f64::INFINITY }, area)
+    };
+    let mut steepness: Vec<(f64, f64)> = normals.iter().map(steepness).collect();
+    let [p99] = quantiles(&mut steepness, [0.99]);
+    if p99 > most {
+        return None;
+    }
+    let axes = perpendicular(axis);
+    let origin = mesh.points()[chart.vertices().first()?.index()];
+    let place = |x: Vec3| axes.map(|a| dot(sub(x, origin), a));
+    let places: Vec<[f64; 2]> = chart.vertices().iter().map(|v| place(mesh.points()[v.index()])).collect();
+    certified(chart, &places)
+}
+
+fn doubled_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
+    cross(sub(b, a), sub(c, a))
+}
