@@ -4,7 +4,7 @@
 
 use crate::atlas::Chart;
 use crate::bernstein::{self, ExactDet};
-use crate::certify::{CertifiedMap, PlanarMap};
+use crate::certify::CertifiedMap;
 use crate::element;
 use crate::grid::GridPoint;
 use crate::mesh::Stars;
@@ -37,15 +37,11 @@ pub struct Summary {
 
 /// The fields of every triangle of `chart` under `map`.
 pub fn fields(chart: &Chart, map: &CertifiedMap) -> Vec<CellFields> {
-    fields_of(chart, map.map())
-}
-
-fn fields_of(chart: &Chart, map: &PlanarMap) -> Vec<CellFields> {
     (0..chart.triangles().len()).map(|f| cell_fields(chart, map, f)).collect()
 }
 
-fn cell_fields(chart: &Chart, map: &PlanarMap, face: usize) -> CellFields {
-    let nodes = map.cells[face].map(|n| map.nodes[n as usize]);
+fn cell_fields(chart: &Chart, map: &CertifiedMap, face: usize) -> CellFields {
+    let nodes = map.map().cells[face].map(|n| map.map().nodes[n as usize]);
     let coefficients = ExactDet::new(nodes).coefficients();
     let (least, largest) = bernstein::range(coefficients);
     let doubled_area = 2.0 * chart.area(face);
@@ -96,21 +92,12 @@ fn conformal_distortion(chart: &Chart, face: usize, x: [[f64; 2]; 6]) -> f64 {
 /// Sums up the fields of a chart. Triangles whose shape mollification changed by more than 1 % are left out of the
 /// conformal quantiles (unless all are).
 pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summary {
-    summed_up(chart, map.map(), fields)
-}
-
-/// The distortion of a proven map of `chart`.
-pub(crate) fn summary_of(chart: &Chart, map: &PlanarMap) -> Summary {
-    summed_up(chart, map, &fields_of(chart, map))
-}
-
-fn summed_up(chart: &Chart, map: &PlanarMap, fields: &[CellFields]) -> Summary {
     let all_flagged = chart.flagged().iter().all(|f| *f);
     let counted = |f: &usize| all_flagged || !chart.flagged()[*f];
     let weighted = |f: usize| (fields[f].conformal_distortion, chart.shapes()[f].area());
     let mut conformal: Vec<_> = (0..fields.len()).filter(counted).map(weighted).collect();
     let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
-    Summary { conformal_median, conformal_p99, area_ratio: ratio(star_scales(chart, &plane_areas(map))) }
+    Summary { conformal_median, conformal_p99, area_ratio: area_ratio(chart, map) }
 }
 
 /// Per vertex, the area scale of its star of two rings, with the area of its own star as weight; `plane` are the areas
@@ -138,13 +125,13 @@ fn star_scales(chart: &Chart, plane: &[f64]) -> Vec<(f64, f64)> {
 /// Per triangle, the logarithm of the area scale around it: the mean over its corners, each with its two rings.
 pub(crate) fn log_scales(chart: &Chart, map: &CertifiedMap) -> Vec<f64> {
     let logs: Vec<f64> =
-        star_scales(chart, &plane_areas(map.map())).into_iter().map(|(scale, _)| finite(scale).ln()).collect();
+        star_scales(chart, &plane_areas(map)).into_iter().map(|(scale, _)| finite(scale).ln()).collect();
     chart.triangles().iter().map(|t| t.iter().map(|v| logs[v.index()]).sum::<f64>() / 3.0).collect()
 }
 
 /// The area ratio of a chart (see [`Summary::area_ratio`]).
 pub fn area_ratio(chart: &Chart, map: &CertifiedMap) -> f64 {
-    ratio(star_scales(chart, &plane_areas(map.map())))
+    ratio(star_scales(chart, &plane_areas(map)))
 }
 
 /// The area ratio of a map that may be invalid here and there, by the nodes of each triangle of the chart: stars whose
@@ -163,9 +150,9 @@ fn ratio(mut scales: Vec<(f64, f64)>) -> f64 {
 }
 
 /// Per triangle of a map its area in the plane.
-fn plane_areas(map: &PlanarMap) -> Vec<f64> {
-    let place = |n: u32| map.nodes[n as usize];
-    map.cells.iter().map(|c| area_in_plane(&ExactDet::new(c.map(place)).coefficients())).collect()
+fn plane_areas(map: &CertifiedMap) -> Vec<f64> {
+    let place = |n: u32| map.map().nodes[n as usize];
+    map.map().cells.iter().map(|c| area_in_plane(&ExactDet::new(c.map(place)).coefficients())).collect()
 }
 
 /// The values at the given shares of the total weight.

@@ -30,7 +30,7 @@ pub use arcs::Arc;
 pub use incidence::IncidenceError;
 pub use polygons::Wrong;
 pub use star::star_centre;
-pub use straight::{StraightError, StraightMap, prove_straight};
+pub use straight::{StraightError, StraightMap, parts, prove_straight};
 
 /// A quadratic map as it is written: cells of six nodes (vertices, then the middles of 01, 12, 20), the places of
 /// the nodes, and a point in each hole from which the whole loop can be seen.

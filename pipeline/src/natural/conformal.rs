@@ -1,11 +1,12 @@
 //! The least squares conformal map of a chart, with a free boundary.
 //!
 //! Dirichlet energy minus area in the plane, 1/2 sum (|grad u|^2 + |grad v|^2) - A(u, v), is zero for conformal maps and
-//! positive for all others; with two vertices held it has one minimiser. Linear elements: least squares in quadratic ones
-//! folds, as z^2 is among them. Holes stay open.
+//! positive for all others; with two vertices held it has one minimiser. Linear elements, on the four parts of each triangle:
+//! least squares in quadratic ones folds, as z^2 is among them. Holes stay open.
 
-use super::{Natural, certified};
+use super::{Natural, cells, certified};
 use crate::atlas::Chart;
+use crate::certify::parts;
 use crate::host::Host;
 use crate::mesh::TriangleShape;
 use crate::sparse::{self, PRESCRIBED, Pattern};
@@ -16,39 +17,70 @@ use crate::sparse::{self, PRESCRIBED, Pattern};
 /// The system cannot be solved.
 pub fn conformal(chart: &Chart, host: &dyn Host) -> Result<Option<Natural>, sparse::Error> {
     let held = far_apart(chart);
-    let vertices = chart.vertices().len();
-    let mut number = vec![PRESCRIBED; vertices];
-    let mut free = 0;
-    for (v, number) in number.iter_mut().enumerate().filter(|(v, _)| !held.contains(v)) {
-        debug_assert!(v < vertices);
-        *number = free;
-        free += 1;
-    }
-    let unknown = |v: usize, k: u32| if number[v] == PRESCRIBED { PRESCRIBED } else { 2 * number[v] + k };
-    let of_triangle = |t: &[crate::id::VertexId; 3]| {
-        let [a, b, c] = t.map(|v| v.index());
-        [unknown(a, 0), unknown(b, 0), unknown(c, 0), unknown(a, 1), unknown(b, 1), unknown(c, 1)]
-    };
-    let elements: Vec<[u32; 6]> = chart.triangles().iter().map(of_triangle).collect();
-    let pattern = Pattern::new(2 * free as usize, &elements);
+    let numbers = Numbers::new(chart.vertices().len() + chart.edges().len(), held);
+    let nodes: Vec<[usize; 3]> = cells(chart).into_iter().flat_map(similar).collect();
+    let elements: Vec<[u32; 6]> = nodes.iter().map(|part| numbers.unknowns(*part)).collect();
+    let pattern = Pattern::new(numbers.count(), &elements);
     let mut values = pattern.zeros();
-    let mut rhs = vec![0.0; 2 * free as usize];
-    // One vertex is held at the origin, the other at (1, 0).
-    let one = held[1];
-    for (f, shape) in chart.shapes().iter().enumerate() {
-        let matrix = element(shape);
+    let mut rhs = vec![0.0; numbers.count()];
+    for (f, unknowns) in elements.iter().enumerate() {
+        // The four parts of a triangle have its shape, and so its matrix.
+        let matrix = element(&chart.shapes()[f / 4]);
         pattern.add(&mut values, f, &matrix);
-        if let Some(k) = chart.triangles()[f].iter().position(|v| v.index() == one) {
-            let entries = elements[f].iter().zip(&matrix).filter(|(row, _)| **row != PRESCRIBED);
+        // One node is held at the origin, the other at (1, 0).
+        if let Some(k) = nodes[f].iter().position(|n| *n == held[1]) {
+            let entries = unknowns.iter().zip(&matrix).filter(|(row, _)| **row != PRESCRIBED);
             entries.for_each(|(row, entries)| rhs[*row as usize] -= entries[k]);
         }
     }
     pattern.analyse()?.factorise(&values, host)?.solve(&mut rhs, 1);
-    let place = |v: usize| match number[v] {
-        PRESCRIBED => [if v == one { 1.0 } else { 0.0 }, 0.0],
-        n => [rhs[2 * n as usize], rhs[2 * n as usize + 1]],
-    };
-    Ok(certified(chart, &(0..vertices).map(place).collect::<Vec<_>>()))
+    Ok(certified(chart, &numbers.places(&rhs)))
+}
+
+/// The four parts of a triangle, each with its corners in the order in which they have the angles of the triangle's.
+fn similar(cell: [u32; 6]) -> [[usize; 3]; 4] {
+    let [a, b, c, [ab, bc, ca]] = parts(cell.map(|n| n as usize));
+    [a, b, c, [bc, ca, ab]]
+}
+
+/// The numbers of the unknowns: u and v of every node but the two that are held.
+struct Numbers {
+    of_node: Vec<u32>,
+    held: [usize; 2],
+}
+
+impl Numbers {
+    fn new(nodes: usize, held: [usize; 2]) -> Self {
+        let mut next = 0;
+        let number = |n: usize| {
+            if held.contains(&n) {
+                return PRESCRIBED;
+            }
+            next += 2;
+            next - 2
+        };
+        Self { of_node: (0..nodes).map(number).collect(), held }
+    }
+
+    fn count(&self) -> usize {
+        2 * (self.of_node.len() - 2)
+    }
+
+    /// Those of three nodes: u of each, then v of each.
+    fn unknowns(&self, nodes: [usize; 3]) -> [u32; 6] {
+        let v = |u: u32| if u == PRESCRIBED { PRESCRIBED } else { u + 1 };
+        let [a, b, c] = nodes.map(|n| self.of_node[n]);
+        [a, b, c, v(a), v(b), v(c)]
+    }
+
+    /// Where the nodes lie, by the unknowns.
+    fn places(&self, solution: &[f64]) -> Vec<[f64; 2]> {
+        let place = |(node, number): (usize, &u32)| match *number {
+            PRESCRIBED => [if node == self.held[1] { 1.0 } else { 0.0 }, 0.0],
+            u => [solution[u as usize], solution[u as usize + 1]],
+        };
+        self.of_node.iter().enumerate().map(place).collect()
+    }
 }
 
 /// Two vertices of the outer loop, half of its length apart: the first one, and the one opposite.

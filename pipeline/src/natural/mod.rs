@@ -6,7 +6,8 @@
 //! - [`projection`]: along the mean of the normals, for what is nearly a plane;
 //! - [`conformal`]: least squares conformal (Levy, Petitjean, Ray and Maillot 2002, *Least squares conformal maps*, doi
 //!   10.1145/566654.566590; the energy as in Mullen, Tong, Alliez and Desbrun 2008, doi 10.1111/j.1467-8659.2008.01289.x), with
-//!   a free boundary: what can be unrolled without stretching is.
+//!   a free boundary: what can be unrolled without stretching is. On the four parts of each triangle: coarse needles fold
+//!   without them.
 //!
 //! Neither is one-to-one by construction. What the certifier does not prove is no [`Natural`].
 
@@ -14,10 +15,10 @@ mod conformal;
 mod projection;
 
 use crate::atlas::Chart;
-use crate::certify::{PlanarMap, StraightMap, prove_straight};
-use crate::distortion::{Summary, summary_of};
+use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
+use crate::distortion::{Summary, quantiles};
 use crate::grid::GridPoint;
-use crate::id::{FaceId, HalfEdgeId};
+use crate::id::{FaceId, HalfEdgeId, VertexId};
 pub use conformal::conformal;
 pub use projection::projection;
 
@@ -33,11 +34,24 @@ pub struct Natural {
     pub distortion: Summary,
 }
 
-/// The map with the vertices of a chart at `places`, scaled to fit and rounded to the grid; none where it is not one-to-one.
+/// The map with the nodes of a chart at `places` (its vertices, then the middles of its edges), scaled to fit and rounded to
+/// the grid; none where it is not one-to-one.
 fn certified(chart: &Chart, places: &[[f64; 2]]) -> Option<Natural> {
-    let map = prove_straight(straight(chart, &fitted(places)?)).ok()?;
-    let distortion = summary_of(chart, map.map());
+    let nodes = fitted(places)?.into_iter().map(GridPoint::mid).collect();
+    let map = PlanarMap { cells: cells(chart), nodes, hole_centres: vec![] };
+    let map = prove_straight(map).ok()?;
+    let distortion = summary(chart, map.map());
     Some(Natural { map, distortion })
+}
+
+/// The nodes of each triangle of a chart: its vertices, then the middles of its edges.
+fn cells(chart: &Chart) -> Vec<[u32; 6]> {
+    let vertices = chart.vertices().len();
+    let cell = |(f, t): (usize, &[VertexId; 3])| {
+        let middle = |side| vertices + chart.edges().edge(HalfEdgeId::side_of(FaceId::at(f), side)).index();
+        [t[0].0, t[1].0, t[2].0, middle(0) as u32, middle(1) as u32, middle(2) as u32]
+    };
+    chart.triangles().iter().enumerate().map(cell).collect()
 }
 
 /// Places moved and scaled into a disk of [`RADIUS`] around the origin; none where they all are one, or not finite.
@@ -51,22 +65,40 @@ fn fitted(places: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
     (scale.is_finite() && scale > 0.0).then(|| places.iter().map(moved).collect())
 }
 
-/// The map by straight triangles with the vertices at `places`, rounded to the grid. Nodes: the vertices of the chart, then
-/// its edges.
-fn straight(chart: &Chart, places: &[[f64; 2]]) -> PlanarMap {
-    let vertices = places.len();
-    let mut nodes: Vec<GridPoint> = places.iter().map(|p| GridPoint::vertex(*p)).collect();
-    nodes.resize(vertices + chart.edges().len(), GridPoint::default());
-    let mut cells = Vec::with_capacity(chart.triangles().len());
-    for (f, t) in chart.triangles().iter().enumerate() {
-        let mids = [0, 1, 2].map(|side| {
-            let edge = vertices + chart.edges().edge(HalfEdgeId::side_of(FaceId::at(f), side)).index();
-            nodes[edge] = nodes[t[side].index()].midpoint(nodes[t[(side + 1) % 3].index()]);
-            edge as u32
-        });
-        cells.push([t[0].0, t[1].0, t[2].0, mids[0], mids[1], mids[2]]);
+/// How much the parts of a chart's triangles are stretched. The area ratio is that of parts, not of stars.
+fn summary(chart: &Chart, map: &PlanarMap) -> Summary {
+    let (mut conformal, mut scales) = (Vec::new(), Vec::new());
+    for (shape, cell) in chart.shapes().iter().zip(&map.cells) {
+        let uv = cell.map(|n| map.nodes[n as usize].uv());
+        let [a, b, c] = shape.in_plane();
+        let middle = |p: [f64; 2], q: [f64; 2]| [0, 1].map(|k| 0.5 * (p[k] + q[k]));
+        let flat = [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
+        let area = 0.25 * shape.area();
+        for (from, to) in parts(flat).into_iter().zip(parts(uv)) {
+            let (stretch, scale) = stretch(from, to);
+            conformal.push((stretch, area));
+            scales.push((scale, area));
+        }
     }
-    PlanarMap { cells, nodes, hole_centres: vec![] }
+    let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
+    let [least, most] = quantiles(&mut scales, [0.001, 0.999]);
+    Summary { conformal_median, conformal_p99, area_ratio: (most / least).clamp(1.0, f64::MAX) }
+}
+
+/// The ratio of the singular values of the linear map from one triangle of the plane to another, and that of their areas.
+fn stretch(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> (f64, f64) {
+    let sides = |t: [[f64; 2]; 3]| [1, 2].map(|i| [t[i][0] - t[0][0], t[i][1] - t[0][1]]);
+    let ([p, q], [u, v]) = (sides(from), sides(to));
+    let doubled = p[0] * q[1] - p[1] * q[0];
+    // The columns of the matrix.
+    let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled);
+    let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled);
+    let det = x[0] * y[1] - x[1] * y[0];
+    // |f_z| + |f_conj z| is the larger singular value.
+    let largest = 0.5 * ((x[0] + y[1]).hypot(x[1] - y[0]) + (x[0] - y[1]).hypot(x[1] + y[0]));
+    let ratio = largest * largest / det;
+    let bounded = |x: f64| if x.is_finite() && x > 0.0 { x } else { f64::MAX };
+    (bounded(ratio).max(1.0), bounded(det))
 }
 
 #[cfg(test)]

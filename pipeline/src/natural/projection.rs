@@ -32,7 +32,12 @@ pub fn projection(mesh: &SurfaceMesh, chart: &Chart, most: f64) -> Option<Natura
     let axes = perpendicular(axis);
     let origin = mesh.points()[chart.vertices().first()?.index()];
     let place = |x: Vec3| axes.map(|a| dot(sub(x, origin), a));
-    let places: Vec<[f64; 2]> = chart.vertices().iter().map(|v| place(mesh.points()[v.index()])).collect();
+    let mut places: Vec<[f64; 2]> = chart.vertices().iter().map(|v| place(mesh.points()[v.index()])).collect();
+    for (_, sides) in chart.edges().iter() {
+        let [h, t] = [sides[0], sides[0].next()];
+        let ends = [chart.from(h), chart.from(t)].map(|v| places[v.index()]);
+        places.push([0, 1].map(|k| 0.5 * (ends[0][k] + ends[1][k])));
+    }
     certified(chart, &places)
 }
 

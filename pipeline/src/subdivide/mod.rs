@@ -24,12 +24,12 @@ mod refine;
 
 use crate::CertifiedChart;
 use crate::atlas::Chart;
-use crate::certify::{CertifiedMap, PlanarMap, StraightMap, prove};
+use crate::certify::{CertifiedMap, PlanarMap, StraightMap, parts, polygons, prove};
 use crate::curvature::Principal;
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, CurveId, FaceId, VertexId};
 use crate::mesh::SurfaceMesh;
-use crate::seams::{Curve, SeamNetwork};
+use crate::seams::{Curve, Passage, SeamNetwork};
 use crate::space::Vec3;
 use nodes::Nodes;
 use std::borrow::Cow;
@@ -259,7 +259,18 @@ fn split(
         let mut split: Vec<LinearChart> =
             charts.iter().zip(&current).map(|(c, m)| quartered(mesh, c, m, &nodes)).collect();
         let failed = match refine::refine(refine::DEPTH, mesh, charts, &current, &mut nodes, &mut split) {
-            Ok(refined) => return Ok(Split { nodes, charts: split, by, refined }),
+            Ok(refined) => {
+                let is_straight = |c: &usize| by[*c] == HandedOver::Straight;
+                let touches = |c: &usize| touches_itself(&split[*c], ChartId::at(*c), network, &nodes);
+                let touching: Vec<usize> = (0..by.len()).filter(is_straight).filter(touches).collect();
+                if touching.is_empty() {
+                    return Ok(Split { nodes, charts: split, by, refined });
+                }
+                for chart in touching {
+                    (by[chart], chosen[chart]) = (HandedOver::Certified, certified(chart));
+                }
+                continue;
+            }
             Err(failed) => failed,
         };
         for (chart, inverted) in blamed(failed, &by, network, &nodes)? {
@@ -274,6 +285,32 @@ fn split(
             };
         }
     }
+}
+
+/// Whether the boundary of a chart whose curves were halved beyond the middles of edges crosses or touches itself in the
+/// plane. What was proven is the polygon through these; new nodes are rounded to the grid.
+fn touches_itself(chart: &LinearChart, id: ChartId, network: &SeamNetwork, nodes: &Nodes) -> bool {
+    let curve = |p: &Passage| &network.curves()[p.curve.index()];
+    if !network.loops(id).iter().flatten().any(|p| is_halved(curve(p), nodes)) {
+        return false;
+    }
+    let local: BTreeMap<u32, GridPoint> = chart.nodes.iter().copied().zip(chart.uv.iter().copied()).collect();
+    let along = |p: &Passage| {
+        let mut along = nodes.along(curve(p));
+        if !p.forward {
+            along.reverse();
+        }
+        along.pop();
+        along
+    };
+    let polygon = |turn: &Vec<Passage>| turn.iter().flat_map(along).map(|n| local[&n]).collect();
+    let polygons: Vec<Vec<GridPoint>> = network.loops(id).iter().map(polygon).collect();
+    polygons::check(&polygons).is_some()
+}
+
+/// Whether a curve has more nodes than ends and middles of edges.
+fn is_halved(curve: &Curve, nodes: &Nodes) -> bool {
+    nodes.along(curve).len() > 2 * curve.segments() + 1
 }
 
 /// The charts that need a plainer map, so that those that `failed` come out right.
@@ -312,8 +349,7 @@ fn blamed(
 /// Per chart, those on the other side of curves that have more nodes than ends and middles of edges.
 fn beside_halved_curves(charts: usize, network: &SeamNetwork, nodes: &Nodes) -> Vec<BTreeSet<usize>> {
     let mut beside = vec![BTreeSet::new(); charts];
-    let is_halved = |c: &&Curve| nodes.along(c).len() > 2 * c.segments() + 1;
-    for curve in network.curves().iter().filter(is_halved) {
+    for curve in network.curves().iter().filter(|c| is_halved(c, nodes)) {
         for (a, b) in curve.sides().iter().flat_map(|a| curve.sides().iter().map(move |b| (a, b))) {
             beside[a.chart.index()].insert(b.chart.index());
         }
@@ -359,7 +395,7 @@ fn refuse_self_contact(network: &SeamNetwork, charts: usize) -> Result<(), Error
         }
     }
     for chart in (0..charts).map(ChartId::at) {
-        let begin = |p: &crate::seams::Passage| network.curves()[p.curve.index()].ends()[usize::from(!p.forward)];
+        let begin = |p: &Passage| network.curves()[p.curve.index()].ends()[usize::from(!p.forward)];
         let mut passed: Vec<usize> = network.loops(chart).iter().flatten().map(begin).collect();
         passed.sort_unstable();
         if let Some(twice) = passed.windows(2).find(|w| w[0] == w[1]) {
@@ -372,7 +408,6 @@ fn refuse_self_contact(network: &SeamNetwork, charts: usize) -> Result<(), Error
 /// Every triangle split into four, between corners and mid-edge nodes.
 fn quartered(mesh: &SurfaceMesh, chart: &Chart, map: &PlanarMap, nodes: &Nodes) -> LinearChart {
     assert_eq!(map.nodes.len(), chart.vertices().len() + chart.edges().len(), "the map of this chart");
-    let parts = |[a, b, c, ab, bc, ca]: [u32; 6]| [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
     LinearChart {
         nodes: nodes.of_chart(mesh, chart),
         uv: map.nodes.clone(),
