@@ -14,6 +14,7 @@ use pipeline::natural::{Natural, conformal, projection};
 use pipeline::space::unit_scale;
 use pipeline::spikes::spikes;
 use pipeline::subdivide::{self, LinearAtlas, subdivide};
+use std::collections::BTreeMap;
 
 /// Gmsh gets at least this many edges along the diagonal of the bounding box, unless another size is asked for.
 const EDGES_PER_DIAGONAL: f64 = 50.0;
@@ -49,6 +50,10 @@ const EDGES_PER_LOOP: f64 = 8.0;
 
 /// A chart is so many elements wide at least, unless it is as wide as an edge is long.
 const ELEMENTS_ACROSS: f64 = 1.5;
+
+/// The same for charts that share two curves without a common end, as the two sides of a thin strip do: an edge across such a
+/// chart, from curve to curve, may be one of the other chart, too (two of truck_nonmanifold).
+const ACROSS_SHEETS: f64 = 3.0;
 
 /// Charts of less than so many squares of the size get elements small enough for their whole boundary, inside, too, and half
 /// of the size where MeshAdapt makes them: it measures edges at their middles, and cuts off what sticks out (a third of a
@@ -202,8 +207,10 @@ impl Extent {
 /// nodes become the same triangle. A chart needs elements as small as it is wide, and a curve one edge.
 fn wanted_sizes(charts: &[Chart], network: &SeamNetwork) -> Vec<f64> {
     let mut wanted: Vec<f64> = network.curves().iter().map(Curve::length).collect();
+    let sheets = sheets(charts.len(), network);
     for chart in charts {
-        let width = Extent::of(chart, network).width() / ELEMENTS_ACROSS;
+        let across = if sheets[chart.id().index()] { ACROSS_SHEETS } else { ELEMENTS_ACROSS };
+        let width = Extent::of(chart, network).width() / across;
         for turn in network.loops(chart.id()) {
             let size = width.min(length_of(turn, network) / EDGES_PER_LOOP);
             for passage in turn {
@@ -213,6 +220,23 @@ fn wanted_sizes(charts: &[Chart], network: &SeamNetwork) -> Vec<f64> {
         }
     }
     wanted
+}
+
+/// Per chart, whether it shares two curves without a common end with another.
+fn sheets(charts: usize, network: &SeamNetwork) -> Vec<bool> {
+    let mut shared: BTreeMap<[usize; 2], Vec<[usize; 2]>> = BTreeMap::new();
+    let mut are_sheets = vec![false; charts];
+    for curve in network.curves() {
+        let sides = || curve.sides().iter().map(|s| s.chart.index());
+        for pair in sides().flat_map(|a| sides().map(move |b| [a, b])).filter(|[a, b]| a < b) {
+            let others = shared.entry(pair).or_default();
+            if others.iter().any(|ends| ends.iter().all(|e| !curve.ends().contains(e))) {
+                pair.iter().for_each(|c| are_sheets[*c] = true);
+            }
+            others.push(curve.ends());
+        }
+    }
+    are_sheets
 }
 
 /// MeshAdapt where maps stretch, in a unit in which it searches little more than a tenth of an edge around a point.

@@ -1,7 +1,8 @@
 """verify_remesh.py [--seconds N] [--any-size] [--keep] RESULT...: remeshes each result with the real Gmsh (`gmsh remesh.geo -2`,
 no other flags, in a copy of the hand-off) and looks at what came out:
 
-- Gmsh reads the triangles of the input from atlas.msh, and its maps are those of surface.vtu;
+- Gmsh reads the triangles of the input from atlas.msh, and its maps are those of surface.vtu, or lead from the surface to the
+  plane and back to the same place where the report says that a chart has another one;
 - Gmsh ends in time and without an error, and writes remesh.msh;
 - the mesh has the Euler number of the input, open edges only along open edges of the input, edges of more than two
   triangles only along such edges, and no two triangles on the same three nodes;
@@ -92,7 +93,7 @@ def inner_nodes(cells):
     return inner[:: max(1, len(inner) // 300)]
 
 
-def verify_atlas(folder, linear_charts, diagonal):
+def verify_atlas(folder, linear_charts, natural_charts, diagonal):
     """Gmsh reads the triangles of the input from atlas.msh, and its maps are those of surface.vtu."""
     grid = read_grid(os.path.join(folder, "surface.vtu"))
     places, uv = vtk_to_numpy(grid.GetPoints().GetData()), vtk_to_numpy(grid.GetPointData().GetArray("uv"))
@@ -110,7 +111,11 @@ def verify_atlas(folder, linear_charts, diagonal):
             if chart in linear_charts or not len(nodes) or thickness <= 1e-6 * diagonal:
                 # Other places in the plane, or a flat chart, which Gmsh projects.
                 continue
-            x = numpy.array(gmsh.model.getValue(2, tag, uv[nodes].ravel())).reshape(-1, 3)
+            if chart in natural_charts:
+                there = gmsh.model.getParametrization(2, tag, places[nodes].ravel())
+            else:
+                there = uv[nodes].ravel()
+            x = numpy.array(gmsh.model.getValue(2, tag, there)).reshape(-1, 3)
             off = numpy.abs(x - places[nodes]).max() / diagonal
             assert off < TOLERANCE, f"chart {chart}: Gmsh's map is off by {off:.1e} of the diagonal"
     finally:
@@ -248,7 +253,7 @@ def verify(folder, seconds, sizes, keep):
     report = json.load(open(os.path.join(folder, "report.json"), encoding="utf-8"))
     surface, faces, charts = read_surface(os.path.join(folder, "surface.vtu"))
     diagonal = numpy.linalg.norm(surface.max(0) - surface.min(0))
-    verify_atlas(folder, report["hand_off"]["linear_charts"], diagonal)
+    verify_atlas(folder, report["hand_off"]["linear_charts"], report["hand_off"]["natural_charts"], diagonal)
     points, triangles, surfaces, lines, said = remesh(folder, seconds, keep)
     assert sorted(set(surfaces)) == sorted(set(charts)), "every chart has triangles"
     assert len(numpy.unique(numpy.sort(triangles, 1), axis=0)) == len(triangles), "two triangles on the same nodes"
