@@ -126,7 +126,10 @@ mod tests {
         let flat = moved(&shapes::disk_with_holes(13, 2), |[x, y, _]| [5.0 + 0.6 * x, y, -0.8 * x]);
         let (mesh, plate) = charts(&flat);
         let of_plate = projection(&mesh, &plate[0], 1.1).expect("it is flat").distortion;
-        assert!((of_plate.conformal_p99 - 1.0).abs() < 1e-9 && (of_plate.area_ratio - 1.0).abs() < 1e-9, "{of_plate:?}");
+        assert!(
+            (of_plate.conformal_p99 - 1.0).abs() < 1e-9 && (of_plate.area_ratio - 1.0).abs() < 1e-9,
+            "{of_plate:?}"
+        );
         let (mesh, dome) = charts(&shapes::disk(8));
         let steep = projection(&mesh, &dome[0], 4.0).expect("hardly bent").distortion.conformal_p99;
         assert!(steep > 1.05, "{steep}");
@@ -160,7 +163,8 @@ mod tests {
         // A ramp of two turns: flat, it lies on itself.
         let (n, turns) = (64, 2.0);
         let point = |k: u32| {
-            let (turn, radius) = (std::f64::consts::TAU * turns * f64::from(k / 2) / f64::from(n), 1.0 + f64::from(k % 2));
+            let (turn, radius) =
+                (std::f64::consts::TAU * turns * f64::from(k / 2) / f64::from(n), 1.0 + f64::from(k % 2));
             [radius * turn.cos(), radius * turn.sin(), 0.05 * turn]
         };
         let points = (0..2 * (n + 1)).map(point).collect();

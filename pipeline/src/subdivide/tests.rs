@@ -110,8 +110,7 @@ fn a_chart_is_handed_over_by_its_projection_where_there_is_one() {
     let flat = TriangleSoup::new(flat, plate.triangles().to_vec()).expect("sound");
     let mut sample = Sample::new(&flat, |p| u32::from(p[0] > 0.1));
     let charts = sample.atlas.charts();
-    sample.straight =
-        charts.iter().map(|c| crate::natural::projection(&sample.mesh, c, 4.0).map(|p| p.map)).collect();
+    sample.straight = charts.iter().map(|c| crate::natural::projection(&sample.mesh, c, 4.0).map(|p| p.map)).collect();
     let linear = sample.verified();
     assert_eq!((linear.straight_charts().len(), linear.refined()), (sample.atlas.charts().len(), 0));
     for chart in linear.charts() {
