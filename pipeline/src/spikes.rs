@@ -5,8 +5,8 @@
 //! part of it that is connected to the point, beside the area of a disk of the same radius r. In the plane both are the
 //! same; at the tip of a cone of half-angle a, it is sin a; on a tube of circumference w, 2 w / (pi r) where r is above w.
 //!
-//! The ball has a radius of two edges. Where the share is below [`THIN`], elements must be smaller; with half the edge
-//! length the same is asked again, [`HALVINGS`] times at most. Balls that reach beyond their chart are passed over: meshers
+//! The ball has a radius of two edges. Where the share is below 0.6, elements must be smaller; with half the edge
+//! length the same is asked again, three times at most. Balls that reach beyond their chart are passed over: meshers
 //! put nodes on every seam, so that nothing is cut off there.
 //!
 //! *It ends.* Each halving looks at each vertex once, and each look at the triangles within a ball; around a vertex that was
