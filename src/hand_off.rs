@@ -33,6 +33,9 @@ const BENT: f64 = 2.0;
 /// its projection (76 degrees).
 const STEEP: f64 = 4.0;
 
+/// From this conformal distortion on a chart is unrolled, if it can be. It takes as long as a map.
+const UNEVEN: f64 = 5.0;
+
 /// Charts with more triangles are not unrolled: a system as large would need memory that nobody gave to the hand-off.
 const UNROLLED: usize = 20_000;
 
@@ -133,7 +136,7 @@ fn natural(mesh: &SurfaceMesh, charts: &[Chart], distortions: &[Summary]) -> Vec
             return None;
         }
         let unrolled = || {
-            let is_wanted = p99 > STRETCHED && chart.triangles().len() <= UNROLLED;
+            let is_wanted = p99 > UNEVEN && chart.triangles().len() <= UNROLLED;
             // Where the system cannot be solved, there is the map on the disk.
             let found = is_wanted.then(|| conformal(chart, &Alone).ok()).flatten().flatten();
             found.filter(|n| n.distortion.conformal_p99 < p99 && n.distortion.area_ratio < EVEN)
@@ -245,7 +248,8 @@ fn algorithms(charts: &[Chart], linear: &LinearAtlas, distortions: &[Summary], s
         let Summary { conformal_p99, area_ratio, .. } = distortions[c];
         let is_quick = area_of(&charts[c]) < QUICK * size * size && area_ratio < EVEN;
         let is_linear = linear.linear_charts().contains(&ChartId::at(c));
-        is_linear || conformal_p99 > if is_quick { BENT } else { STRETCHED }
+        let is_natural = linear.straight_charts().contains(&ChartId::at(c));
+        is_linear || conformal_p99 > if is_quick && !is_natural { BENT } else { STRETCHED }
     };
     // Gmsh takes the plane of flat charts for their map.
     let is_flat = |c: usize| {
