@@ -36,6 +36,18 @@ pub struct MappedChart {
     harmonic: Option<Result<QuadraticMap, sparse::Error>>,
 }
 
+impl MappedChart {
+    /// The conformal distortion that 99 % of the area does not exceed in the harmonic map, where there is one, or else in the
+    /// raised linear map. Untangling changes it little, and takes long where it is large.
+    fn conformal_p99(&self, chart: &Chart) -> f64 {
+        let nodes = match &self.harmonic {
+            Some(Ok(map)) => map.nodes(),
+            _ => &self.start,
+        };
+        distortion::conformal_p99_of_nodes(chart, |f| self.closed.nodes(f).map(|n| nodes[n]))
+    }
+}
+
 /// Why a chart cannot be mapped as a whole. All but the last mean: split it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
@@ -139,8 +151,8 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64, host: &dyn H
 /// right within a decade mostly, and saves untangling; what decides is the certified map.
 const HOPELESS: f64 = 10.0;
 
-/// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, or would be more
-/// distorted than `settings` allow, until every part can. Ends because parts are smaller, and single triangles map.
+/// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, would be more distorted
+/// than `settings` allow, or where neither its map nor a natural one is for a mesher, until every part is right. Ends because parts are smaller, and single triangles map.
 ///
 /// # Errors
 /// [`SplitError`].
@@ -160,14 +172,7 @@ pub fn map_or_split(
         }
         let error = match map_within(&chart, order, settings.max_area_ratio, host) {
             Ok(map) => {
-                let parts = match unsuited(mesh, &chart, &map, host) {
-                    None => None,
-                    Some(Cut::Along(is_left)) => Some(decompose::halve(mesh, &chart, &is_left, settings, host)?),
-                    Some(Cut::Across(log_scales)) => {
-                        decompose::split(mesh, &chart, Some(&log_scales), settings, host)?
-                    }
-                };
-                match parts {
+                match split_if_unsuited(mesh, &chart, &map, settings, host)? {
                     Some(parts) => waiting.extend(parts.into_iter().rev()),
                     None => mapped.push((chart, map)),
                 }
@@ -192,6 +197,21 @@ const TORN_WITH_HOLES: f64 = 10.0;
 /// The same for those without.
 const TORN: f64 = 100.0;
 
+/// The parts of a chart whose map is not for a mesher; none where it is, or the chart is a single triangle.
+fn split_if_unsuited(
+    mesh: &SurfaceMesh,
+    chart: &Chart,
+    map: &MappedChart,
+    settings: &decompose::Settings,
+    host: &dyn Host,
+) -> Result<Option<Vec<Chart>>, decompose::Error> {
+    match unsuited(mesh, chart, map, host) {
+        None => Ok(None),
+        Some(Cut::Along(is_left)) => decompose::halve(mesh, chart, &is_left, settings, host).map(Some),
+        Some(Cut::Across(log_scales)) => decompose::split(mesh, chart, Some(&log_scales), settings, host),
+    }
+}
+
 /// How to cut a chart.
 enum Cut {
     /// Per triangle, whether it lies left of a line through a hole.
@@ -205,7 +225,7 @@ enum Cut {
 fn unsuited(mesh: &SurfaceMesh, chart: &Chart, map: &MappedChart, host: &dyn Host) -> Option<Cut> {
     let start = &map.certified_start;
     let centre = start.certificate().hole_centres.first();
-    let on_disk = distortion::summary(chart, start, &distortion::fields(chart, start)).conformal_p99;
+    let on_disk = map.conformal_p99(chart);
     let most = if centre.is_some() { TORN_WITH_HOLES } else { TORN };
     if on_disk <= most || natural::natural(mesh, chart, on_disk, host).is_some() {
         return None;

@@ -100,7 +100,8 @@ fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
     let roots: Vec<usize> = (0..count).map(|f| parts.find(f)).collect();
     let mut sizes = vec![0; count];
     roots.iter().for_each(|r| sizes[*r] += 1);
-    let largest = |side: bool| roots.iter().copied().filter(|r| is_left[*r] == side).max_by_key(|r| (sizes[*r], count - r));
+    let largest =
+        |side: bool| roots.iter().copied().filter(|r| is_left[*r] == side).max_by_key(|r| (sizes[*r], count - r));
     let kept = [largest(false), largest(true)];
     let mut labels = vec![u32::MAX; count];
     for (label, root) in (0..).zip(kept) {
