@@ -9,7 +9,7 @@ use pipeline::evaluate::Plane;
 use pipeline::host::Alone;
 use pipeline::id::{ChartId, FaceId};
 use pipeline::mesh::SurfaceMesh;
-use pipeline::natural::{Natural, conformal, projection};
+use pipeline::natural::{Natural, natural};
 use pipeline::seams::{Curve, Passage, SeamNetwork};
 use pipeline::space::unit_scale;
 use pipeline::spikes::spikes;
@@ -28,16 +28,6 @@ const STRETCHED: f64 = 10.0;
 /// The same for charts that are quickly done, and whose area is scaled evenly: there MeshAdapt makes the better elements (least
 /// gamma of cad_gmsh_t13, at 2.6, by Frontal-Delaunay 0.09, by MeshAdapt 0.50; of patch_10ks, at 7.1, 0.11 and 0.35).
 const BENT: f64 = 2.0;
-
-/// Charts are projected where a hundredth of their area at most is steeper than this, as the length along a slope over that of
-/// its projection (76 degrees).
-const STEEP: f64 = 4.0;
-
-/// From this conformal distortion on a chart is unrolled, if it can be. It takes as long as a map.
-const UNEVEN: f64 = 5.0;
-
-/// Charts with more triangles are not unrolled: a system as large would need memory that nobody gave to the hand-off.
-const UNROLLED: usize = 20_000;
 
 /// A chart of less than so many squares of the size is quickly done: that is 10,000 elements, a few seconds.
 const QUICK: f64 = 4_500.0;
@@ -97,7 +87,7 @@ pub fn gmsh(
     let shortest_seam_distance = network.shortest_distance(mesh);
     let mut report = HandOff { size, shortest_seam_distance, ..HandOff::default() };
     report.warning = shortest_seam_distance.filter(|d| size > 0.5 * d).map(|d| too_coarse(size, d));
-    let natural = natural(mesh, charts, distortions);
+    let natural = natural_maps(mesh, charts, distortions);
     let straight: Vec<_> = natural.iter().map(|n| n.as_ref().map(|n| n.map.clone())).collect();
     let linear = match subdivide(mesh, charts, maps, &straight, network) {
         Ok(linear) => linear,
@@ -129,19 +119,10 @@ pub fn gmsh(
 }
 
 /// Maps with a boundary of their own for the charts whose maps stretch, where these do less.
-fn natural(mesh: &SurfaceMesh, charts: &[Chart], distortions: &[Summary]) -> Vec<Option<Natural>> {
+fn natural_maps(mesh: &SurfaceMesh, charts: &[Chart], distortions: &[Summary]) -> Vec<Option<Natural>> {
     let of_chart = |(chart, on_disk): (&Chart, &Summary)| {
         let p99 = on_disk.conformal_p99;
-        if p99 <= BENT {
-            return None;
-        }
-        let unrolled = || {
-            let is_wanted = p99 > UNEVEN && chart.triangles().len() <= UNROLLED;
-            // Where the system cannot be solved, there is the map on the disk.
-            let found = is_wanted.then(|| conformal(chart, &Alone).ok()).flatten().flatten();
-            found.filter(|n| n.distortion.conformal_p99 < p99 && n.distortion.area_ratio < EVEN)
-        };
-        projection(mesh, chart, p99.min(STEEP)).or_else(unrolled)
+        (p99 > BENT).then(|| natural(mesh, chart, p99, &Alone)).flatten()
     };
     charts.iter().zip(distortions).map(of_chart).collect()
 }

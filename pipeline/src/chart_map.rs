@@ -10,6 +10,7 @@ use crate::grid::GridPoint;
 use crate::host::{Alone, Cancelled, Host, Pace};
 use crate::linear::{self, LinearMap, linear_map, lower_ears};
 use crate::mesh::SurfaceMesh;
+use crate::natural;
 use crate::quadratic::{QuadraticMap, least_det, quadratic_map};
 use crate::sparse;
 use crate::untangle::{self, Untangled, untangle};
@@ -33,6 +34,18 @@ pub struct MappedChart {
     start: Vec<GridPoint>,
     certified_start: CertifiedMap,
     harmonic: Option<Result<QuadraticMap, sparse::Error>>,
+}
+
+impl MappedChart {
+    /// The conformal distortion that 99 % of the area does not exceed in the harmonic map, where there is one, or else in the
+    /// raised linear map. Untangling changes it little, and takes long where it is large.
+    fn conformal_p99(&self, chart: &Chart) -> f64 {
+        let nodes = match &self.harmonic {
+            Some(Ok(map)) => map.nodes(),
+            _ => &self.start,
+        };
+        distortion::conformal_p99_of_nodes(chart, |f| self.closed.nodes(f).map(|n| nodes[n]))
+    }
 }
 
 /// Why a chart cannot be mapped as a whole. All but the last mean: split it.
@@ -138,8 +151,8 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64, host: &dyn H
 /// right within a decade mostly, and saves untangling; what decides is the certified map.
 const HOPELESS: f64 = 10.0;
 
-/// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, or would be more
-/// distorted than `settings` allow, until every part can. Ends because parts are smaller, and single triangles map.
+/// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, would be more distorted
+/// than `settings` allow, or where neither its map nor a natural one is for a mesher, until every part is right. Ends because parts are smaller, and single triangles map.
 ///
 /// # Errors
 /// [`SplitError`].
@@ -159,7 +172,10 @@ pub fn map_or_split(
         }
         let error = match map_within(&chart, order, settings.max_area_ratio, host) {
             Ok(map) => {
-                mapped.push((chart, map));
+                match split_if_unsuited(mesh, &chart, &map, settings, host)? {
+                    Some(parts) => waiting.extend(parts.into_iter().rev()),
+                    None => mapped.push((chart, map)),
+                }
                 continue;
             }
             Err(MapError::Cancelled) => return Err(SplitError::Cancelled),
@@ -173,6 +189,58 @@ pub fn map_or_split(
         }
     }
     Ok(mapped)
+}
+
+/// Charts with holes whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map.
+const TORN_WITH_HOLES: f64 = 10.0;
+
+/// The same for those without.
+const TORN: f64 = 100.0;
+
+/// The parts of a chart whose map is not for a mesher; none where it is, or the chart is a single triangle.
+fn split_if_unsuited(
+    mesh: &SurfaceMesh,
+    chart: &Chart,
+    map: &MappedChart,
+    settings: &decompose::Settings,
+    host: &dyn Host,
+) -> Result<Option<Vec<Chart>>, decompose::Error> {
+    match unsuited(mesh, chart, map, host) {
+        None => Ok(None),
+        Some(Cut::Along(is_left)) => decompose::halve(mesh, chart, &is_left, settings, host).map(Some),
+        Some(Cut::Across(log_scales)) => decompose::split(mesh, chart, Some(&log_scales), settings, host),
+    }
+}
+
+/// How to cut a chart.
+enum Cut {
+    /// Per triangle, whether it lies left of a line through a hole.
+    Along(Vec<bool>),
+    /// Where the area scale, of which these are the logarithms, changes.
+    Across(Vec<f64>),
+}
+
+/// How to cut a chart that neither the disk nor the plane suits. Rings and plates with holes are cut through a hole: two strips,
+/// each of which can be unrolled, come of a tube; coarse facets along it fold in one map.
+fn unsuited(mesh: &SurfaceMesh, chart: &Chart, map: &MappedChart, host: &dyn Host) -> Option<Cut> {
+    let start = &map.certified_start;
+    let centre = start.certificate().hole_centres.first();
+    let on_disk = map.conformal_p99(chart);
+    let most = if centre.is_some() { TORN_WITH_HOLES } else { TORN };
+    if on_disk <= most || natural::natural(mesh, chart, on_disk, host).is_some() {
+        return None;
+    }
+    let Some(centre) = centre else { return Some(Cut::Across(distortion::log_scales(chart, start))) };
+    let centre = centre.uv();
+    let node = |n: u32| start.map().nodes[n as usize].uv();
+    // The line runs through the middle of the disk, too.
+    let along = if centre == [0.0; 2] { [1.0, 0.0] } else { centre };
+    let is_left = |cell: &[u32; 6]| {
+        let sum = cell[..3].iter().map(|n| node(*n)).fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]);
+        let from = [0, 1].map(|k| sum[k] / 3.0 - centre[k]);
+        along[0] * from[1] > along[1] * from[0]
+    };
+    Some(Cut::Along(start.map().cells.iter().map(is_left).collect()))
 }
 
 /// Why a chart has no map, split or not.

@@ -59,7 +59,7 @@ use patches::compact_cells;
 use predict::CellGraph;
 use search::Search;
 use split::legal;
-pub use split::{contact, separate, split};
+pub use split::{contact, halve, separate, split};
 use voronoi::{Cells, bisect_until};
 
 /// Why a surface has no atlas. Every surface has one.

@@ -67,6 +67,50 @@ pub fn separate(
     pieces(mesh, chart, cut, settings, host)
 }
 
+/// Cuts `chart`, a part of `mesh`, into at least two charts with the same id, between the triangles on one side and those on
+/// the other; `is_left` tells the side of each. Of each side the largest connected part keeps it.
+///
+/// # Errors
+/// As [`split`].
+pub fn halve(
+    mesh: &SurfaceMesh,
+    chart: &Chart,
+    is_left: &[bool],
+    settings: &Settings,
+    host: &dyn Host,
+) -> Result<Vec<Chart>, Error> {
+    let cut = |dual: &Dual, limits: &Limits| {
+        let sides = Cells { of: largest_parts(dual, is_left), count: 2 };
+        bisect_until(dual, sides, |groups| legal(dual, &Complex::new(dual, groups), limits)).of
+    };
+    pieces(mesh, chart, cut, settings, host)
+}
+
+/// Per triangle 0 or 1, the side of the largest connected part of one side that is the fewest triangles away.
+fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
+    let count = is_left.len();
+    let mut parts = UnionFind::new(count);
+    for h in (0..count).flat_map(|f| [0, 1, 2].map(|k| HalfEdgeId::side_of(FaceId::at(f), k))) {
+        if let Some(other) = dual.across(h).map(HalfEdgeId::face) {
+            if is_left[h.face().index()] == is_left[other.index()] {
+                parts.unite(h.face().index(), other.index());
+            }
+        }
+    }
+    let roots: Vec<usize> = (0..count).map(|f| parts.find(f)).collect();
+    let mut sizes = vec![0; count];
+    roots.iter().for_each(|r| sizes[*r] += 1);
+    let largest =
+        |side: bool| roots.iter().copied().filter(|r| is_left[*r] == side).max_by_key(|r| (sizes[*r], count - r));
+    let kept = [largest(false), largest(true)];
+    let mut labels = vec![u32::MAX; count];
+    for (label, root) in (0..).zip(kept) {
+        (0..count).filter(|f| Some(roots[*f]) == root).for_each(|f| labels[f] = label);
+    }
+    let front = (0..count).filter(|f| labels[*f] != u32::MAX).map(FaceId::at).collect();
+    grow(dual, labels, front)
+}
+
 /// Two vertices of a chart that are copies of one vertex of the input, if there are any.
 pub fn contact(mesh: &SurfaceMesh, chart: &Chart) -> Option<[VertexId; 2]> {
     let welded = |(v, place): (&VertexId, u32)| (mesh.welded_vertex(*v), place);
@@ -113,6 +157,11 @@ fn nearer_end(dual: &Dual, ends: [VertexId; 2]) -> Vec<u32> {
             front.push(FaceId::at(f));
         }
     }
+    grow(dual, labels, front)
+}
+
+/// Gives triangles without a label that of the nearest triangle with one, counted in triangles; `front` are those with one.
+fn grow(dual: &Dual, mut labels: Vec<u32>, mut front: Vec<FaceId>) -> Vec<u32> {
     // Breadth first: each triangle enters once.
     while !front.is_empty() {
         let mut next = Vec::new();

@@ -18,7 +18,9 @@ use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
 use crate::distortion::{Summary, quantiles};
 use crate::grid::GridPoint;
+use crate::host::Host;
 use crate::id::{FaceId, HalfEdgeId, VertexId};
+use crate::mesh::SurfaceMesh;
 pub use conformal::conformal;
 pub use projection::projection;
 
@@ -32,6 +34,31 @@ pub struct Natural {
     pub map: StraightMap,
     /// How much it stretches.
     pub distortion: Summary,
+}
+
+/// Charts are projected where a hundredth of their area at most is steeper than this, as the length along a slope over that of
+/// its projection (76 degrees).
+const STEEP: f64 = 4.0;
+
+/// From this conformal distortion on a chart is unrolled, if it can be. It takes as long as a map.
+const UNEVEN: f64 = 5.0;
+
+/// Charts with more triangles are not unrolled: a system as large would need memory that nobody gave to the hand-off.
+const UNROLLED: usize = 20_000;
+
+/// The largest area ratio of a map that is unrolled: meshers cut off what is shrunk.
+const EVEN: f64 = 100.0;
+
+/// A natural map that stretches `chart`, one of `mesh`, less than `on_disk`, the conformal distortion that its map on the disk
+/// does not exceed on 99 % of the area; none where there is none, or that is not found by reasonable means.
+pub fn natural(mesh: &SurfaceMesh, chart: &Chart, on_disk: f64, host: &dyn Host) -> Option<Natural> {
+    let unrolled = || {
+        let is_wanted = on_disk > UNEVEN && chart.triangles().len() <= UNROLLED;
+        // Where the system cannot be solved, there is the map on the disk.
+        let found = is_wanted.then(|| conformal(chart, host).ok()).flatten().flatten();
+        found.filter(|n| n.distortion.conformal_p99 < on_disk && n.distortion.area_ratio < EVEN)
+    };
+    projection(mesh, chart, on_disk.min(STEEP)).or_else(unrolled)
 }
 
 /// The map with the nodes of a chart at `places` (its vertices, then the middles of its edges), scaled to fit and rounded to
@@ -105,7 +132,7 @@ fn stretch(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::host::Alone;
-    use crate::mesh::{SurfaceMesh, TriangleSoup};
+    use crate::mesh::TriangleSoup;
     use crate::space::Vec3;
     use crate::{decompose, repair, shapes};
 
