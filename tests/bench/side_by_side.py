@@ -15,6 +15,9 @@ triangles are (gamma), and how faithful they are to the input's triangles (area,
 planish takes by default: the size of as many equilateral triangles of the same area, at most 1/50 of the diagonal.
 Gmsh's chain reads every file as it is; where it cannot classify a .msh, it gets an STL file of the same triangles.
 
+Where mmgs_O3 is beside this Python, on the PATH or given by --mmgs (pip install mmgpy brings it), a table is added for mmgs
+alone, which changes the mesh directly, without maps: mmgs_O3 -hsiz h -hausd h/10 -ar 40, on a MEDIT file of the same triangles.
+
   side_by_side.py ../shared/anchors/stl                         all of a folder; writes docs/side_by_side.md
   side_by_side.py ../shared/anchors/stl --cad ../shared/meshes  and CAD files
   side_by_side.py ../shared/anchors/stl --only 10k --limit 60   files whose name contains 10k, at most 60 s each
@@ -159,6 +162,16 @@ def write_stl(path, points, triangles):
             lines = "".join(f"vertex {x!r} {y!r} {z!r}\n" for x, y, z in corners)
             file.write(f"facet normal 0 0 0\nouter loop\n{lines}endloop\nendfacet\n")
         file.write("endsolid surface\n")
+
+
+def write_medit(path, points, triangles):
+    """A MEDIT file of these triangles, with every digit."""
+    with open(path, "w", encoding="ascii") as file:
+        file.write(f"MeshVersionFormatted 2\nDimension 3\nVertices\n{len(points)}\n")
+        file.writelines(f"{x!r} {y!r} {z!r} 0\n" for x, y, z in points.tolist())
+        file.write(f"Triangles\n{len(triangles)}\n")
+        file.writelines(f"{a} {b} {c} 1\n" for a, b, c in (triangles + 1).tolist())
+        file.write("End\n")
 
 
 # Gmsh's chain, in a child process.
@@ -376,6 +389,21 @@ def their_run(path, source, h, limit):
     return found
 
 
+def mmgs(path, h, arguments):
+    """mmgs on one file: cost, mesh, what it said."""
+    with tempfile.TemporaryDirectory() as scratch:
+        source, mesh = Path(scratch) / "in.mesh", Path(scratch) / "out.mesh"
+        write_medit(source, *surface(path))
+        command = [arguments.mmgs, "-v", "1", "-hsiz", repr(h), "-hausd", repr(h / 10), "-ar", f"{FEATURE_ANGLE:g}"]
+        cost, said = spend([*command, source, mesh], arguments.limit, scratch)
+        found = {"run": cost, "errors": [] if cost["code"] == 0 else [complaint(said)]}
+        if cost["code"] is None:
+            found["errors"] = [unended([], arguments.limit)]
+        elif mesh.exists():
+            _, found["mesh"], said = child("--mesh-quality", mesh, path, repr(h), limit=arguments.limit)
+    return found
+
+
 def unended(phases, limit):
     """What is told of a chain that was stopped."""
     return f"did not end in {limit:g} s of CPU; done by then: {', '.join(phases) or 'nothing'}"
@@ -421,11 +449,16 @@ def remesh(folder, path, h, limit, found):
 
 def gmsh_program():
     """The program that the Python package of Gmsh brings."""
-    beside = Path(sys.executable).parent / "gmsh"
-    found = beside if beside.exists() else shutil.which("gmsh")
+    found = beside_python("gmsh")
     if not found:
         sys.exit("there is no gmsh beside this Python: pip install -r tests/interop/requirements.txt")
     return found
+
+
+def beside_python(name):
+    """A program beside this Python, or else on the PATH."""
+    beside = Path(sys.executable).parent / name
+    return beside if beside.exists() else shutil.which(name)
 
 
 def complaint(text):
@@ -470,7 +503,7 @@ def cost_row(row, limit):
     meshed = phases.get("mesh_1d", 0) + phases["mesh_2d"] if "mesh_2d" in phases else None
     total = seconds(their_total(row)) if they.get("ended", True) else f"did not end in {limit:g}"
     mine, other = our_total(row), their_total(row)
-    faster = f"{other / mine:.1f}" if mine and other else "–"
+    faster = f"{other / mine:.2g}" if mine and other else "–"
     cut, run = phases.get("classify", 0) + phases.get("create_geometry", 0), we.get("run", {}).get("cpu")
     share = f"{run / cut:.2f}" if run and "create_geometry" in phases else "–"
     return [row["file"], row["triangles"], cost_of(we.get("run"), limit), cost_of(we.get("remesh"), limit),
@@ -479,27 +512,37 @@ def cost_row(row, limit):
 
 
 def result_row(row):
-    """A line of the table of results."""
+    """A line of the table of triangles."""
     cells = [row["file"], f"{row['h']:.4g}"]
     for side in ("ours", "gmsh"):
         found = row.get(side, {})
-        mesh = found.get("mesh", {})
-        worst, low, many = mesh.get("gamma_min"), mesh.get("gamma_low"), mesh.get("triangles")
-        cells += [found.get("charts", "–") if many is not None else "–", "–" if many is None else many,
-                  "–" if worst is None else f"{worst:.2g}", "–" if low is None else f"{100 * low / many:.2f} %"]
+        cells += [found.get("charts", "–") if "triangles" in found.get("mesh", {}) else "–", *triangle_cells(found)]
     return cells
 
 
-def faith_row(row):
-    """A line of the table of how faithful the meshes are."""
-    cells = [row["file"]]
-    for side in ("ours", "gmsh"):
-        mesh = row.get(side, {}).get("mesh", {})
-        cells += [f"{100 * mesh['area'] / row['area']:.1f} %" if "area" in mesh else "–",
-                  length(mesh.get("node_off")), length(mesh.get("surface_off")),
-                  "; ".join(wrong_topology(row, mesh)) or "right" if "topology" in mesh and row["topology"] else "–",
-                  verdict(row, side)]
-    return cells
+def triangle_cells(found):
+    """How many triangles, and how good."""
+    mesh = found.get("mesh", {})
+    worst, low, many = mesh.get("gamma_min"), mesh.get("gamma_low"), mesh.get("triangles")
+    return ["–" if many is None else many, "–" if worst is None else f"{worst:.2g}",
+            "–" if low is None else f"{100 * low / many:.2f} %"]
+
+
+def faith_cells(row, side):
+    """How faithful the mesh of one side is."""
+    mesh = row.get(side, {}).get("mesh", {})
+    return [f"{100 * mesh['area'] / row['area']:.1f} %" if "area" in mesh else "–",
+            length(mesh.get("node_off")), length(mesh.get("surface_off")),
+            "; ".join(wrong_topology(row, mesh)) or "right" if "topology" in mesh and row["topology"] else "–",
+            verdict(row, side)]
+
+
+def mmgs_row(row):
+    """A line of the table of mmgs alone."""
+    found, mine = row["mmgs"], our_total(row)
+    spent = found["run"]["cpu"] if found["run"]["code"] == 0 else None
+    return [row["file"], seconds(spent), f"{spent / mine:.2g}" if spent and mine else "–", *triangle_cells(found),
+            *faith_cells(row, "mmgs")]
 
 
 def length(value):
@@ -538,9 +581,19 @@ def trouble(rows):
     """What went wrong, per file and chain."""
     lines = []
     for row in rows:
-        for side, name in (("ours", "planish"), ("gmsh", "Gmsh")):
+        for side, name in (("ours", "planish"), ("gmsh", "Gmsh"), ("mmgs", "mmgs")):
             lines += [f"- {row['file']}, {name}: {e}" for e in row.get(side, {}).get("errors", [])]
     return "\nWhat the programs said:\n\n" + "\n".join(lines) + "\n" if lines else ""
+
+
+def mmgs_table(rows):
+    """The section on mmgs, where it was run."""
+    head = ["file", "CPU", "mmgs / ours", "triangles", "least gamma", "gamma < 0.1", "area", "nodes off", "surface off",
+            "topology", "**mmgs**"]
+    lines = [mmgs_row(r) for r in rows if "mmgs" in r]
+    told = (f"\n## mmgs alone\n\n`mmgs_O3 -hsiz h -hausd h/10 -ar {FEATURE_ANGLE:g}`, which changes the mesh directly, without "
+            "maps; measured like the others.\n\n")
+    return told + table(head, lines) if lines else ""
 
 
 FAITH = f"""\
@@ -568,8 +621,8 @@ def page(result):
             f"classifySurfaces ({FEATURE_ANGLE:g} degrees, for reparametrization),\ncreateGeometry, generate(2), at "
             "the same h.\n\n## Cost\n\n" + table(costs, [cost_row(r, limit) for r in rows])
             + "\n## Triangles\n\n" + table(results, [result_row(r) for r in rows])
-            + "\n## Faithful to the surface\n\n" + FAITH + "\n" + table(faith, [faith_row(r) for r in rows])
-            + trouble(rows))
+            + "\n## Faithful to the surface\n\n" + FAITH + "\n" + table(faith, [[r["file"], *faith_cells(r, "ours"), *faith_cells(r, "gmsh")] for r in rows])
+            + mmgs_table(rows) + trouble(rows))
 
 
 # The run.
@@ -585,6 +638,7 @@ def options():
                         help="run both chains N times, one after the other, and keep the cheaper run of each (default 1)")
     parser.add_argument("--chains", choices=["both", "ours", "gmsh"], default="both")
     parser.add_argument("--planish", type=Path, default=ROOT / "target/release/planish", metavar="PROGRAM")
+    parser.add_argument("--mmgs", type=Path, default=beside_python("mmgs_O3"), metavar="PROGRAM")
     parser.add_argument("--json", type=Path, default=ROOT / "target/side_by_side.json", metavar="FILE")
     parser.add_argument("--markdown", type=Path, default=ROOT / "docs/side_by_side.md", metavar="FILE")
     return parser.parse_args()
@@ -629,6 +683,8 @@ def kept(path):
 def keep_cheaper(row, chain, found):
     """Keeps the run of a chain that cost least."""
     def cost(one):
+        if chain == "mmgs":
+            return one["run"]["cpu"] if "mesh" in one else math.inf
         total = our_total({"ours": one}) if chain == "ours" else their_total({"gmsh": one})
         return math.inf if total is None else total
     if chain not in row or cost(found) < cost(row[chain]):
@@ -648,6 +704,8 @@ def main():
                 keep_cheaper(row, "ours", ours(path.resolve(), row["h"], arguments))
             if arguments.chains != "ours" and row.get("gmsh", {}).get("ended", True):
                 keep_cheaper(row, "gmsh", theirs(path.resolve(), row["h"], arguments.limit))
+            if arguments.chains == "both" and arguments.mmgs:
+                keep_cheaper(row, "mmgs", mmgs(path.resolve(), row["h"], arguments))
         write(result, arguments)
         print(" | ".join(str(c) for c in cost_row(row, arguments.limit)), flush=True)
 
