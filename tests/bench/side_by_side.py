@@ -8,8 +8,8 @@ file has, and
 
 each in a process of its own, one at a time, with one thread. Times are CPU seconds (user + system) of the whole
 process; on a noisy machine, --repeat 2 keeps the cheaper of two runs of each chain. A process that reaches the limit "did
-not end", which is a result. Both meshes are then measured in the same way, in a process that is not timed: how good their
-triangles are (gamma), and how faithful they are to the input's triangles (area, distance, topology; see "Measures").
+not end", which is a result. Both meshes are then measured in the same way, in a process that is not timed: how good
+their triangles are (gamma), and how faithful they are to the input's triangles (area, distance, topology).
 
 --cad FOLDER adds the CAD files of FOLDER that are listed in CAD. Their triangles are long and few, so that h is what
 planish takes by default: the size of as many equilateral triangles of the same area, at most 1/50 of the diagonal.
@@ -24,8 +24,7 @@ alone, which changes the mesh directly, without maps: mmgs_O3 -hsiz h -hausd h/1
   side_by_side.py part.stl --chains gmsh --json gmsh.json --markdown gmsh.md
 
 The JSON (default: side_by_side.json in the target folder) and the page are written anew after every file; what the page
-holds from "## Reading" on is written by people, and kept. Run it with the Python
-of the tests (.venv); on Debian Gmsh needs libglu1-mesa libxcursor1 libxft2 libxinerama1 libfontconfig1.
+holds from "## Reading" on is written by people, and kept. Run it with the Python of the tests (.venv); on Debian Gmsh needs libglu1-mesa libxcursor1 libxft2 libxinerama1 libfontconfig1.
 """
 import argparse
 import json
@@ -396,10 +395,12 @@ def mmgs(path, h, arguments):
         write_medit(source, *surface(path))
         command = [arguments.mmgs, "-v", "1", "-hsiz", repr(h), "-hausd", repr(h / 10), "-ar", f"{FEATURE_ANGLE:g}"]
         cost, said = spend([*command, source, mesh], arguments.limit, scratch)
-        found = {"run": cost, "errors": [] if cost["code"] == 0 else [complaint(said)]}
+        found = {"run": cost, "errors": []}
         if cost["code"] is None:
-            found["errors"] = [unended([], arguments.limit)]
-        elif mesh.exists():
+            found["errors"].append(unended([], arguments.limit))
+        elif cost["code"] or not mesh.exists():
+            found["errors"].append(f"gave up (exit code {cost['code']}); its last words: {complaint(said)}")
+        else:
             _, found["mesh"], said = child("--mesh-quality", mesh, path, repr(h), limit=arguments.limit)
     return found
 
@@ -557,7 +558,7 @@ def wrong_topology(row, mesh):
 
 
 def verdict(row, side):
-    """In one word what the mesh is, or else what is wrong with it. Faithful: topology, area and distances are right
+    """In a word what the mesh is, or else what is wrong with it. Faithful: topology, area and distances are right
     and every chart has triangles. Sound: and no triangle has gamma below 0.1."""
     if side not in row:
         return "–"
@@ -568,7 +569,7 @@ def verdict(row, side):
               ("area", AREA[0] <= mesh["area"] / row["area"] <= AREA[1]), ("nodes off", mesh["node_off"] <= NODE_OFF),
               ("surface lost", mesh["surface_off"] <= SURFACE_OFF)]
     wrong = [name for name, right in checks if not right]
-    return ", ".join(wrong) or ("faithful" if mesh["gamma_low"] else "**sound**")
+    return "wrong: " + ", ".join(wrong) if wrong else ("faithful" if mesh["gamma_low"] else "**sound**")
 
 
 def table(head, rows):
@@ -601,7 +602,8 @@ Area is that of the mesh relative to the input's triangles. Distances are the gr
 nodes from the surface, and of points of the surface (by area, about h / 2 apart, at most {SAMPLES:,}) from the mesh.
 Topology is right where Euler number, components, open loops and edges of more than two triangles are those of the input
 after planish's repair (`planish info`). A mesh is faithful if that is right, every chart has triangles, the area is
-{AREA[0]:g} to {AREA[1]:g}, no node is {NODE_OFF:g} h off and nothing of the surface {SURFACE_OFF:g} h; sound if also no gamma is below 0.1.
+{AREA[0]:g} to {AREA[1]:g}, no node is more than {NODE_OFF:g} h off and nothing of the surface more than {SURFACE_OFF:g} h; sound if also no gamma is
+below 0.1. CAD files (cad_...) are meshed at planish's default size.
 """
 
 
