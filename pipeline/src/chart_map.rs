@@ -37,11 +37,12 @@ pub struct MappedChart {
 }
 
 impl MappedChart {
-    /// The conformal distortion that 99 % of the area does not exceed in the harmonic map, where there is one, or else in the
-    /// raised linear map. Untangling changes it little, and takes long where it is large.
+    /// The conformal distortion that 99 % of the area does not exceed: for charts with holes in the harmonic map, where there is
+    /// one (untangling changes it little, and takes long where it is large), for others in the raised linear map. Noise makes
+    /// many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
     fn conformal_p99(&self, chart: &Chart) -> f64 {
         let nodes = match &self.harmonic {
-            Some(Ok(map)) => map.nodes(),
+            Some(Ok(map)) if !chart.holes().is_empty() => map.nodes(),
             _ => &self.start,
         };
         distortion::conformal_p99_of_nodes(chart, |f| self.closed.nodes(f).map(|n| nodes[n]))
@@ -367,7 +368,45 @@ fn planar(closed: &ClosedChart, nodes: &[GridPoint], hole_centres: Vec<GridPoint
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::TriangleSoup;
     use crate::{repair, shapes};
+
+    /// An open tube of radius 1 and height `height` with `n` facets around, in `rows` rows.
+    fn tube(n: u32, rows: u32, height: f64) -> TriangleSoup {
+        let at = |row: u32, i: u32| row * n + i % n;
+        let point = |k: u32| {
+            let angle = std::f64::consts::TAU * f64::from(k % n) / f64::from(n);
+            [angle.cos(), angle.sin(), height * f64::from(k / n) / f64::from(rows)]
+        };
+        let points = (0..n * (rows + 1)).map(point).collect();
+        let quads = (0..rows).flat_map(|row| (0..n).map(move |i| (row, i)));
+        let halves = |(row, i): (u32, u32)| {
+            [[at(row, i), at(row, i + 1), at(row + 1, i + 1)], [at(row, i), at(row + 1, i + 1), at(row + 1, i)]]
+        };
+        TriangleSoup::new(points, quads.flat_map(halves).collect()).expect("sound")
+    }
+
+    fn parts(soup: &TriangleSoup) -> (SurfaceMesh, Vec<Chart>) {
+        let mesh = repair(soup, &Default::default()).expect("repairs").mesh;
+        let whole = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").into_charts();
+        let settings = decompose::Settings { feature_angle: None, ..Default::default() };
+        let cut = |chart| map_or_split(&mesh, chart, Order::Quadratic, &settings, &Alone).expect("maps");
+        let charts = whole.into_iter().flat_map(cut).map(|(chart, _)| chart).collect();
+        (mesh, charts)
+    }
+
+    #[test]
+    fn a_tube_of_long_facets_becomes_strips_that_unroll_and_a_fine_one_stays_whole() {
+        let (mesh, strips) = parts(&tube(36, 1, 20.0));
+        assert!(strips.len() >= 2, "{}", strips.len());
+        for strip in &strips {
+            assert!(strip.holes().is_empty());
+            let natural = crate::natural::natural(&mesh, strip, f64::MAX, &Alone).expect("it unrolls");
+            assert!(natural.distortion.conformal_p99 < 4.0, "{:?}", natural.distortion);
+        }
+        let (_, whole) = parts(&tube(36, 6, 3.0));
+        assert_eq!(whole.len(), 1, "nothing stretches there");
+    }
 
     #[test]
     fn what_untangling_stretches_too_much_is_split() {
