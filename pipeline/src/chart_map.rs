@@ -36,19 +36,6 @@ pub struct MappedChart {
     harmonic: Option<Result<QuadraticMap, sparse::Error>>,
 }
 
-impl MappedChart {
-    /// The conformal distortion that 99 % of the area does not exceed: for charts with holes in the harmonic map, where there is
-    /// one (untangling changes it little, and takes long where it is large), for others in the raised linear map. Noise makes
-    /// many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
-    fn conformal_p99(&self, chart: &Chart) -> f64 {
-        let nodes = match &self.harmonic {
-            Some(Ok(map)) if !chart.holes().is_empty() => map.nodes(),
-            _ => &self.start,
-        };
-        distortion::conformal_p99_of_nodes(chart, |f| self.closed.nodes(f).map(|n| nodes[n]))
-    }
-}
-
 /// Why a chart cannot be mapped as a whole. All but the last mean: split it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
@@ -153,7 +140,7 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64, host: &dyn H
 const HOPELESS: f64 = 10.0;
 
 /// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, would be more distorted
-/// than `settings` allow, or where neither its map nor a natural one is for a mesher, until every part is right. Ends because parts are smaller, and single triangles map.
+/// than `settings` allow, or is a ring that neither the disk nor the plane suits, until every part is right. Ends because parts are smaller, and single triangles map.
 ///
 /// # Errors
 /// [`SplitError`].
@@ -173,8 +160,11 @@ pub fn map_or_split(
         }
         let error = match map_within(&chart, order, settings.max_area_ratio, host) {
             Ok(map) => {
-                match split_if_unsuited(mesh, &chart, &map, settings, host)? {
-                    Some(parts) => waiting.extend(parts.into_iter().rev()),
+                match strips(mesh, &chart, &map, host) {
+                    Some(is_left) => {
+                        let parts = decompose::halve(mesh, &chart, &is_left, settings, host)?;
+                        waiting.extend(parts.into_iter().rev());
+                    }
                     None => mapped.push((chart, map)),
                 }
                 continue;
@@ -192,46 +182,18 @@ pub fn map_or_split(
     Ok(mapped)
 }
 
-/// Charts with holes whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map.
-const TORN_WITH_HOLES: f64 = 10.0;
+/// Rings whose linear map stretches more than this on a hundredth of their area are cut, unless they have a natural map.
+const TORN: f64 = 10.0;
 
-/// The same for those without.
-const TORN: f64 = 100.0;
-
-/// The parts of a chart whose map is not for a mesher; none where it is, or the chart is a single triangle.
-fn split_if_unsuited(
-    mesh: &SurfaceMesh,
-    chart: &Chart,
-    map: &MappedChart,
-    settings: &decompose::Settings,
-    host: &dyn Host,
-) -> Result<Option<Vec<Chart>>, decompose::Error> {
-    match unsuited(mesh, chart, map, host) {
-        None => Ok(None),
-        Some(Cut::Along(is_left)) => decompose::halve(mesh, chart, &is_left, settings, host).map(Some),
-        Some(Cut::Across(log_scales)) => decompose::split(mesh, chart, Some(&log_scales), settings, host),
-    }
-}
-
-/// How to cut a chart.
-enum Cut {
-    /// Per triangle, whether it lies left of a line through a hole.
-    Along(Vec<bool>),
-    /// Where the area scale, of which these are the logarithms, changes.
-    Across(Vec<f64>),
-}
-
-/// How to cut a chart that neither the disk nor the plane suits. Rings and plates with holes are cut through a hole: two strips,
-/// each of which can be unrolled, come of a tube; coarse facets along it fold in one map.
-fn unsuited(mesh: &SurfaceMesh, chart: &Chart, map: &MappedChart, host: &dyn Host) -> Option<Cut> {
+/// For a ring that neither the disk nor the plane suits, per triangle whether it lies left of a line through the hole. Two
+/// strips, each of which can be unrolled, come of a tube; coarse facets along it fold in one map.
+fn strips(mesh: &SurfaceMesh, chart: &Chart, map: &MappedChart, host: &dyn Host) -> Option<Vec<bool>> {
     let start = &map.certified_start;
-    let centre = start.certificate().hole_centres.first();
-    let on_disk = map.conformal_p99(chart);
-    let most = if centre.is_some() { TORN_WITH_HOLES } else { TORN };
-    if on_disk <= most || natural::natural(mesh, chart, on_disk, host).is_some() {
+    let [centre] = start.certificate().hole_centres[..] else { return None };
+    let on_disk = distortion::summary(chart, start, &distortion::fields(chart, start)).conformal_p99;
+    if on_disk <= TORN || natural::natural(mesh, chart, on_disk, host).is_some() {
         return None;
     }
-    let Some(centre) = centre else { return Some(Cut::Across(distortion::log_scales(chart, start))) };
     let centre = centre.uv();
     let node = |n: u32| start.map().nodes[n as usize].uv();
     // The line runs through the middle of the disk, too.
@@ -241,7 +203,7 @@ fn unsuited(mesh: &SurfaceMesh, chart: &Chart, map: &MappedChart, host: &dyn Hos
         let from = [0, 1].map(|k| sum[k] / 3.0 - centre[k]);
         along[0] * from[1] > along[1] * from[0]
     };
-    Some(Cut::Along(start.map().cells.iter().map(is_left).collect()))
+    Some(start.map().cells.iter().map(is_left).collect())
 }
 
 /// Why a chart has no map, split or not.
