@@ -91,10 +91,9 @@ fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
     let count = is_left.len();
     let mut parts = UnionFind::new(count);
     for h in (0..count).flat_map(|f| [0, 1, 2].map(|k| HalfEdgeId::side_of(FaceId::at(f), k))) {
-        if let Some(other) = dual.across(h).map(HalfEdgeId::face) {
-            if is_left[h.face().index()] == is_left[other.index()] {
-                parts.unite(h.face().index(), other.index());
-            }
+        let beside = dual.across(h).map(|t| t.face().index());
+        if let Some(other) = beside.filter(|other| is_left[*other] == is_left[h.face().index()]) {
+            parts.unite(h.face().index(), other);
         }
     }
     let roots: Vec<usize> = (0..count).map(|f| parts.find(f)).collect();
