@@ -2,6 +2,7 @@
 
 use crate::support::{Out, fixture, planish};
 use planish::outcome::{Code, Status};
+use planish::report::Report;
 use std::path::Path;
 
 /// The files of a certified result, in their order.
@@ -223,13 +224,18 @@ fn jobs_and_memory_do_not_change_a_byte() {
 #[test]
 fn order_1_writes_the_same_files_with_straight_triangles() {
     let out = Out::new();
-    assert_eq!(out.run(&[&fixture("disk_with_holes.stl")], &["--order", "1"]).code, Some(0));
-    let report = out.report("disk_with_holes.stl");
-    let files: Vec<_> = report.outputs.iter().map(|o| o.file.as_str()).collect();
-    // Its map stretches, and its edges are shorter than 1: Gmsh gets the atlas in a larger unit, too.
+    let inputs = ["disk_with_holes.stl", "finger.obj"].map(|n| fixture(n));
+    assert_eq!(out.run(&inputs.each_ref().map(|p| p.as_path()), &["--order", "1"]).code, Some(0));
+    let files = |report: &Report| report.outputs.iter().map(|o| o.file.clone()).collect::<Vec<_>>();
+    // A map stretches, none better is found, and edges are shorter than 1: Gmsh gets the atlas in a larger unit, too.
+    let finger = out.report("finger.obj");
     let expected = [&ALL_FILES[..], &["atlas-enlarged.msh"]].concat();
-    assert_eq!((files, report.settings.order), (expected, 1));
-    assert!(report.hand_off.is_some_and(|h| h.enlarged > 1.0 && h.adapted_charts == [0]));
+    assert_eq!((files(&finger), finger.settings.order), (expected.iter().map(|f| f.to_string()).collect(), 1));
+    assert!(finger.hand_off.is_some_and(|h| h.enlarged > 1.0 && h.adapted_charts == [2]));
+    // What is nearly a plane is its own map, and needs none of that.
+    let report = out.report("disk_with_holes.stl");
+    assert_eq!((files(&report), report.settings.order), (ALL_FILES.map(str::to_owned).to_vec(), 1));
+    assert!(report.hand_off.is_some_and(|h| h.enlarged == 1.0 && h.natural_charts == [0]));
     let chart = &report.charts[0];
     assert_eq!((&chart.quadratic, &chart.untangle, chart.certificate.by_exact), (&None, &None, 0));
     let grid = planish::formats::vtu::read(&out.read("disk_with_holes.stl", "surface.vtu")).expect("readable");
