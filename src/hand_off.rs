@@ -88,7 +88,7 @@ pub fn gmsh(
     let mut report = HandOff { size, shortest_seam_distance, ..HandOff::default() };
     report.warning = shortest_seam_distance.filter(|d| size > 0.5 * d).map(|d| too_coarse(size, d));
     let natural = natural_maps(mesh, charts, distortions);
-    let straight: Vec<_> = natural.iter().map(|n| n.as_ref().map(|n| n.map.clone())).collect();
+    let straight: Vec<_> = natural.iter().map(|n| n.as_ref().map(|n| &n.map)).collect();
     let linear = match subdivide(mesh, charts, maps, &straight, network) {
         Ok(linear) => linear,
         Err(error) => {
@@ -128,7 +128,7 @@ fn natural_maps(mesh: &SurfaceMesh, charts: &[Chart], distortions: &[Summary]) -
 }
 
 /// The curves along narrow places and the small charts, by the size of elements there: half of `size`, a quarter, and so on.
-/// `adapted` are the charts that MeshAdapt makes.
+/// `adapted` are the charts that MeshAdapt makes, ascending.
 fn narrow(charts: &[Chart], network: &SeamNetwork, adapted: &[usize], size: f64) -> Vec<gmsh::Narrow> {
     let halved = |n: u32| gmsh::Narrow { size: size * 0.5_f64.powi(n as i32), ..gmsh::Narrow::default() };
     let mut found: Vec<gmsh::Narrow> = (1..=gmsh::Narrow::HALVINGS).map(halved).collect();
@@ -147,7 +147,7 @@ fn narrow(charts: &[Chart], network: &SeamNetwork, adapted: &[usize], size: f64)
         if area > SMALL * size * size {
             continue;
         }
-        let is_adapted = adapted.contains(&chart.id().index());
+        let is_adapted = adapted.binary_search(&chart.id().index()).is_ok();
         let inside = if is_adapted { 0.5 * size } else { size };
         if let Some(class) = class(inside.min(perimeter / EDGES_PER_LOOP)) {
             found[class].surfaces.push(chart.id().index());
@@ -228,8 +228,8 @@ fn algorithms(charts: &[Chart], linear: &LinearAtlas, distortions: &[Summary], s
     let stretches = |c: usize| {
         let Summary { conformal_p99, area_ratio, .. } = distortions[c];
         let is_quick = area_of(&charts[c]) < QUICK * size * size && area_ratio < EVEN;
-        let is_linear = linear.linear_charts().contains(&ChartId::at(c));
-        let is_natural = linear.straight_charts().contains(&ChartId::at(c));
+        let is_linear = linear.linear_charts().binary_search(&ChartId::at(c)).is_ok();
+        let is_natural = linear.straight_charts().binary_search(&ChartId::at(c)).is_ok();
         is_linear || conformal_p99 > if is_quick && !is_natural { BENT } else { STRETCHED }
     };
     // Gmsh takes the plane of flat charts for their map.

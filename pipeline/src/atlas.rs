@@ -80,6 +80,17 @@ impl Chart {
         self.triangles[h.face().index()][h.side()]
     }
 
+    /// Per triangle its six nodes: vertices, then the middles of the edges 01, 12, 20. Nodes are numbered as in the maps of
+    /// the chart: its vertices, then its edges.
+    pub fn cells(&self) -> impl Iterator<Item = [u32; 6]> {
+        let middle = |h| (self.vertices.len() + self.edges.edge(h).index()) as u32;
+        let cell = move |(f, t): (usize, &[VertexId; 3])| {
+            let [ab, bc, ca] = [0, 1, 2].map(|side| middle(HalfEdgeId::side_of(FaceId::at(f), side)));
+            [t[0].0, t[1].0, t[2].0, ab, bc, ca]
+        };
+        self.triangles.iter().enumerate().map(cell)
+    }
+
     /// The length of the edge along `h`, mollified.
     pub fn length(&self, h: HalfEdgeId) -> f64 {
         self.shapes[h.face().index()].lengths[h.side()]

@@ -140,7 +140,8 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64, host: &dyn H
 const HOPELESS: f64 = 10.0;
 
 /// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, would be more distorted
-/// than `settings` allow, or is a ring that neither the disk nor the plane suits, until every part is right. Ends because parts are smaller, and single triangles map.
+/// than `settings` allow, or is a ring that neither the disk nor the plane suits, until every part is right. Ends because
+/// parts are smaller, and single triangles map.
 ///
 /// # Errors
 /// [`SplitError`].

@@ -77,16 +77,21 @@ fn conformal_distortion(chart: &Chart, face: usize, x: [[f64; 2]; 6]) -> f64 {
         let det = (a[0] * b[1] - a[1] * b[0]) / (length * height);
         let first = a.map(|v| v / length);
         let second = [0, 1].map(|k| (b[k] - shift * first[k]) / height);
-        // |f_z| + |f_conj z| is the larger singular value.
-        let stretch = 0.5
-            * ((first[0] + second[1]).hypot(first[1] - second[0]) + (first[0] - second[1]).hypot(first[1] + second[0]));
-        stretch * stretch / det
+        singular_ratio(first, second, det)
     };
     let largest = element::NODES
         .iter()
         .map(at)
         .fold(1.0, |m, r| if r.is_finite() && r > 0.0 { f64::max(m, r) } else { f64::MAX });
     largest.clamp(1.0, f64::MAX)
+}
+
+/// The ratio of the singular values of a matrix, by its columns and its determinant.
+pub(crate) fn singular_ratio(first: [f64; 2], second: [f64; 2], det: f64) -> f64 {
+    // |f_z| + |f_conj z| is the larger singular value.
+    let largest =
+        0.5 * ((first[0] + second[1]).hypot(first[1] - second[0]) + (first[0] - second[1]).hypot(first[1] + second[0]));
+    largest * largest / det
 }
 
 /// Sums up the fields of a chart. Triangles whose shape mollification changed by more than 1 % are left out of the

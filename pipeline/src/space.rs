@@ -33,16 +33,6 @@ pub fn distance(a: Vec3, b: Vec3) -> f64 {
     norm(sub(a, b))
 }
 
-/// Two directions at right angles to a unit normal and each other, which turn left around it.
-pub fn perpendicular(normal: Vec3) -> [Vec3; 2] {
-    let least = (1..3).fold(0, |best, k| if normal[k].abs() < normal[best].abs() { k } else { best });
-    let mut direction = [0.0; 3];
-    direction[least] = 1.0;
-    let first = cross(direction, normal);
-    let first = first.map(|c| c / norm(first));
-    [first, cross(normal, first)]
-}
-
 /// The area of the triangle `p`.
 pub fn triangle_area(p: [Vec3; 3]) -> f64 {
     0.5 * norm(cross(sub(p[1], p[0]), sub(p[2], p[0])))

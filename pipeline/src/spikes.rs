@@ -15,6 +15,7 @@
 
 use crate::atlas::Chart;
 use crate::curvature::Principal;
+use crate::evaluate::on_segment;
 use crate::id::{FaceId, HalfEdgeId};
 use crate::mesh::SurfaceMesh;
 use crate::space::{Vec3, cross, distance, dot, norm, sub, triangle_area};
@@ -179,7 +180,7 @@ impl<'a> Search<'a> {
             }
             for side in 0..3 {
                 let ends = [corners[side], corners[(side + 1) % 3]];
-                if distance_to_segment(centre, ends) < radius && !self.cross(face, side) {
+                if on_segment(centre, ends).1 < radius * radius && !self.cross(face, side) {
                     return None;
                 }
             }
@@ -202,13 +203,6 @@ impl<'a> Search<'a> {
         other.into_iter().for_each(|other| self.reach(other));
         other.is_some()
     }
-}
-
-fn distance_to_segment(p: Vec3, [a, b]: [Vec3; 2]) -> f64 {
-    let (along, from) = (sub(b, a), sub(p, a));
-    let length = dot(along, along);
-    let t = if length > 0.0 { (dot(from, along) / length).clamp(0.0, 1.0) } else { 0.0 };
-    norm(sub(from, along.map(|c| t * c)))
 }
 
 /// The area of the part of a triangle within a ball.

@@ -75,42 +75,51 @@ pub fn prove_straight(map: PlanarMap) -> Result<StraightMap, StraightError> {
 mod tests {
     use super::*;
 
-    /// An L of two squares, each of two triangles, with the corners at these places.
-    fn map(corners: [[f64; 2]; 6]) -> PlanarMap {
-        let triangles = [[0, 1, 2], [0, 2, 3], [3, 2, 4], [3, 4, 5]];
-        let mut nodes: Vec<GridPoint> = corners.map(GridPoint::vertex).to_vec();
+    /// The map with the corners of triangles at these places.
+    fn map(corners: &[[f64; 2]], triangles: &[[usize; 3]]) -> PlanarMap {
+        let mut nodes: Vec<GridPoint> = corners.iter().map(|p| GridPoint::vertex(*p)).collect();
         let mut edges: Vec<[usize; 2]> = Vec::new();
         let mut cells = Vec::new();
         for t in triangles {
             let mids = [0, 1, 2].map(|k| {
-                let edge: [usize; 2] = [t[k], t[(k + 1) % 3]];
-                let known = edges.iter().position(|e| *e == edge || *e == [edge[1], edge[0]]);
-                6 + known.unwrap_or_else(|| {
-                    edges.push(edge);
-                    nodes.push(nodes[edge[0]].midpoint(nodes[edge[1]]));
-                    edges.len() - 1
-                })
+                let (from, to) = (t[k], t[(k + 1) % 3]);
+                let edge = [from.min(to), from.max(to)];
+                let known = edges.iter().position(|e| *e == edge);
+                corners.len()
+                    + known.unwrap_or_else(|| {
+                        edges.push(edge);
+                        nodes.push(nodes[from].midpoint(nodes[to]));
+                        edges.len() - 1
+                    })
             });
             cells.push([t[0], t[1], t[2], mids[0], mids[1], mids[2]].map(|n| n as u32));
         }
         PlanarMap { cells, nodes, hole_centres: vec![] }
     }
 
+    /// An L of two squares, each of two triangles, with the corners at these places.
+    fn bent_strip(corners: [[f64; 2]; 6]) -> PlanarMap {
+        map(&corners, &[[0, 1, 2], [0, 2, 3], [3, 2, 4], [3, 4, 5]])
+    }
+
     const BENT: [[f64; 2]; 6] = [[0.0, 0.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5], [0.25, 0.75], [-0.5, 0.5]];
 
     #[test]
     fn an_l_is_proven_although_it_is_not_convex_and_its_broken_twins_are_not() {
-        assert!(prove_straight(map(BENT)).is_ok());
+        assert!(prove_straight(bent_strip(BENT)).is_ok());
         let mut folded = BENT;
         folded[4] = [0.25, 0.25];
-        assert_eq!(prove_straight(map(folded)).err(), Some(StraightError::Folded { count: 2, first: FaceId(2) }));
+        assert_eq!(
+            prove_straight(bent_strip(folded)).err(),
+            Some(StraightError::Folded { count: 2, first: FaceId(2) })
+        );
         // Middles that lie elsewhere are corners of parts like any other.
-        let mut bent = map(BENT);
+        let mut bent = bent_strip(BENT);
         bent.nodes[6].y -= 1 << 50;
         assert!(prove_straight(bent.clone()).is_ok());
         bent.nodes[6].y += 1 << 52;
         assert_eq!(prove_straight(bent).err(), Some(StraightError::Folded { count: 1, first: FaceId(0) }));
-        let mut far = map(BENT);
+        let mut far = bent_strip(BENT);
         far.nodes[1].y = i64::MAX / 2;
         assert_eq!(prove_straight(far).err(), Some(StraightError::Node(Error::Inexact { node: 1 })));
     }
@@ -120,30 +129,10 @@ mod tests {
         // A strip of squares that goes around a square hole, and on over its own beginning.
         let ring = |k: usize| [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][k % 4];
         for (turns, is_proven) in [(3, true), (4, false), (5, false)] {
-            let corner = |k: usize, r: f64| ring(k).map(|c| GridPoint::vertex([c * r, 0.0]).uv()[0]);
-            let mut nodes: Vec<GridPoint> = Vec::new();
-            for k in 0..=turns {
-                nodes.extend([0.25, 0.75].map(|r| GridPoint::vertex(corner(k, r))));
-            }
-            let vertices = nodes.len();
-            let mut cells = Vec::new();
-            let mut edges: Vec<[usize; 2]> = Vec::new();
-            for k in 0..turns {
-                let [a, b, c, d] = [2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2];
-                for t in [[a, b, c], [a, c, d]] {
-                    let mids = [0, 1, 2].map(|i| {
-                        let edge = [t[i].min(t[(i + 1) % 3]), t[i].max(t[(i + 1) % 3])];
-                        vertices
-                            + edges.iter().position(|e| *e == edge).unwrap_or_else(|| {
-                                edges.push(edge);
-                                nodes.push(nodes[edge[0]].midpoint(nodes[edge[1]]));
-                                edges.len() - 1
-                            })
-                    });
-                    cells.push([t[0], t[1], t[2], mids[0], mids[1], mids[2]].map(|n| n as u32));
-                }
-            }
-            let proven = prove_straight(PlanarMap { cells, nodes, hole_centres: vec![] });
+            let corners: Vec<[f64; 2]> =
+                (0..=turns).flat_map(|k| [0.25, 0.75].map(|r| ring(k).map(|c: f64| c * r))).collect();
+            let halves = |k: usize| [[2 * k, 2 * k + 1, 2 * k + 3], [2 * k, 2 * k + 3, 2 * k + 2]];
+            let proven = prove_straight(map(&corners, &(0..turns).flat_map(halves).collect::<Vec<_>>()));
             assert_eq!(proven.is_ok(), is_proven, "{turns}: {:?}", proven.err());
             assert!(is_proven || matches!(proven, Err(StraightError::Boundary(Wrong::Crossing(_)))));
         }

@@ -1,7 +1,7 @@
 //! The plane of a flat triangulation, which is a map of it as good as any other.
 
 use crate::grid::{GridPoint, orientation};
-use crate::space::{Vec3, cross, dot, norm, perpendicular, sub, unit_scale};
+use crate::space::{Vec3, cross, dot, norm, sub, unit_scale};
 
 /// A triangulation is flat where no node is further from its plane than this, relative to its extent.
 const FLAT: f64 = 1e-9;
@@ -10,6 +10,7 @@ const FLAT: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     origin: Vec3,
+    normal: Vec3,
     axes: [Vec3; 2],
 }
 
@@ -22,23 +23,13 @@ impl Plane {
     pub fn of(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<Self> {
         let corners = |t: &[u32; 3]| t.map(|n| points[n as usize]);
         let origin = corners(triangles.first()?)[0];
-        let mut normal = [0.0; 3];
-        for t in triangles {
-            let [a, b, c] = corners(t);
-            let n = cross(sub(b, a), sub(c, a));
-            (0..3).for_each(|k| normal[k] += n[k]);
-        }
-        let length = norm(normal);
-        if length.is_nan() || length <= 0.0 {
-            return None;
-        }
-        let normal = normal.map(|c| c / length);
+        let plane = Self::facing(origin, triangles.iter().map(corners))?;
+        let normal = plane.normal;
         let used = || triangles.iter().flat_map(corners);
         let extent = used().map(|p| norm(sub(p, origin))).fold(0.0_f64, f64::max);
         if used().any(|p| dot(sub(p, origin), normal).abs() > FLAT * extent) {
             return None;
         }
-        let plane = Self { origin, axes: perpendicular(normal) };
         let scale = unit_scale(extent);
         let turns_left = |t: &[u32; 3]| {
             let [a, b, c] = corners(t).map(|p| GridPoint::mid(plane.place(p).map(|x| x * scale)));
@@ -47,10 +38,41 @@ impl Plane {
         triangles.iter().all(turns_left).then_some(plane)
     }
 
+    /// The plane through a point whose normal is that of the sum of the areas of some triangles; none where that has no
+    /// direction.
+    pub fn facing(origin: Vec3, triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Option<Self> {
+        let mut sum = [0.0; 3];
+        for [a, b, c] in triangles {
+            let n = cross(sub(b, a), sub(c, a));
+            (0..3).for_each(|k| sum[k] += n[k]);
+        }
+        let length = norm(sum);
+        if !length.is_finite() || length <= 0.0 {
+            return None;
+        }
+        let normal = sum.map(|c| c / length);
+        Some(Self { origin, normal, axes: axes(normal) })
+    }
+
+    /// The unit normal.
+    pub fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
     /// Where a point lies in the plane, in the unit of space.
     pub fn place(&self, x: Vec3) -> [f64; 2] {
         self.axes.map(|axis| dot(sub(x, self.origin), axis))
     }
+}
+
+/// Two directions at right angles to a unit normal and each other, which turn left around it.
+fn axes(normal: Vec3) -> [Vec3; 2] {
+    let least = (1..3).fold(0, |best, k| if normal[k].abs() < normal[best].abs() { k } else { best });
+    let mut direction = [0.0; 3];
+    direction[least] = 1.0;
+    let first = cross(direction, normal);
+    let first = first.map(|c| c / norm(first));
+    [first, cross(normal, first)]
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! positive for all others; with two vertices held it has one minimiser. Linear elements, on the four parts of each triangle:
 //! least squares in quadratic ones folds, as z^2 is among them. Holes stay open.
 
-use super::{Natural, cells, certified};
+use super::{Natural, certified};
 use crate::atlas::Chart;
 use crate::certify::parts;
 use crate::host::Host;
@@ -18,7 +18,7 @@ use crate::sparse::{self, PRESCRIBED, Pattern};
 pub fn conformal(chart: &Chart, host: &dyn Host) -> Result<Option<Natural>, sparse::Error> {
     let held = far_apart(chart);
     let numbers = Numbers::new(chart.vertices().len() + chart.edges().len(), held);
-    let nodes: Vec<[usize; 3]> = cells(chart).into_iter().flat_map(similar).collect();
+    let nodes: Vec<[usize; 3]> = chart.cells().flat_map(similar).collect();
     let elements: Vec<[u32; 6]> = nodes.iter().map(|part| numbers.unknowns(*part)).collect();
     let pattern = Pattern::new(numbers.count(), &elements);
     let mut values = pattern.zeros();

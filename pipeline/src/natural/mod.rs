@@ -16,10 +16,9 @@ mod projection;
 
 use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
-use crate::distortion::{Summary, quantiles};
+use crate::distortion::{Summary, quantiles, singular_ratio};
 use crate::grid::GridPoint;
 use crate::host::Host;
-use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;
 pub use conformal::conformal;
 pub use projection::projection;
@@ -65,20 +64,10 @@ pub fn natural(mesh: &SurfaceMesh, chart: &Chart, on_disk: f64, host: &dyn Host)
 /// the grid; none where it is not one-to-one.
 fn certified(chart: &Chart, places: &[[f64; 2]]) -> Option<Natural> {
     let nodes = fitted(places)?.into_iter().map(GridPoint::mid).collect();
-    let map = PlanarMap { cells: cells(chart), nodes, hole_centres: vec![] };
+    let map = PlanarMap { cells: chart.cells().collect(), nodes, hole_centres: vec![] };
     let map = prove_straight(map).ok()?;
     let distortion = summary(chart, map.map());
     Some(Natural { map, distortion })
-}
-
-/// The nodes of each triangle of a chart: its vertices, then the middles of its edges.
-fn cells(chart: &Chart) -> Vec<[u32; 6]> {
-    let vertices = chart.vertices().len();
-    let cell = |(f, t): (usize, &[VertexId; 3])| {
-        let middle = |side| vertices + chart.edges().edge(HalfEdgeId::side_of(FaceId::at(f), side)).index();
-        [t[0].0, t[1].0, t[2].0, middle(0) as u32, middle(1) as u32, middle(2) as u32]
-    };
-    chart.triangles().iter().enumerate().map(cell).collect()
 }
 
 /// Places moved and scaled into a disk of [`RADIUS`] around the origin; none where they all are one, or not finite.
@@ -121,11 +110,8 @@ fn stretch(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> (f64, f64) {
     let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled);
     let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled);
     let det = x[0] * y[1] - x[1] * y[0];
-    // |f_z| + |f_conj z| is the larger singular value.
-    let largest = 0.5 * ((x[0] + y[1]).hypot(x[1] - y[0]) + (x[0] - y[1]).hypot(x[1] + y[0]));
-    let ratio = largest * largest / det;
     let bounded = |x: f64| if x.is_finite() && x > 0.0 { x } else { f64::MAX };
-    (bounded(ratio).max(1.0), bounded(det))
+    (bounded(singular_ratio(x, y, det)).max(1.0), bounded(det))
 }
 
 #[cfg(test)]

@@ -6,41 +6,31 @@
 use super::{Natural, certified};
 use crate::atlas::Chart;
 use crate::distortion::quantiles;
+use crate::evaluate::Plane;
 use crate::mesh::SurfaceMesh;
-use crate::space::{Vec3, cross, dot, norm, perpendicular, sub};
+use crate::space::{Vec3, cross, dot, norm, sub};
 
 /// The projection of `chart`, one of `mesh`, along the mean of its normals; none where that is not one-to-one, or the
 /// conformal distortion of a hundredth of the area is above `most`.
 pub fn projection(mesh: &SurfaceMesh, chart: &Chart, most: f64) -> Option<Natural> {
-    let normals: Vec<Vec3> = chart.faces().iter().map(|f| doubled_normal(mesh.corners(f.index()))).collect();
-    let mut sum = [0.0; 3];
-    normals.iter().for_each(|n| (0..3).for_each(|k| sum[k] += n[k]));
-    let length = norm(sum);
-    if !(length.is_finite() && length > 0.0) {
-        return None;
-    }
-    let axis = sum.map(|c| c / length);
-    let steepness = |n: &Vec3| {
-        let (area, projected) = (norm(*n), dot(*n, axis));
+    let triangles = || chart.faces().iter().map(|f| mesh.corners(f.index()));
+    let origin = mesh.points()[chart.vertices().first()?.index()];
+    let plane = Plane::facing(origin, triangles())?;
+    let steepness = |[a, b, c]: [Vec3; 3]| {
+        let doubled = cross(sub(b, a), sub(c, a));
+        let (area, projected) = (norm(doubled), dot(doubled, plane.normal()));
         (if projected > 0.0 { area / projected } else { f64::INFINITY }, area)
     };
-    let mut steepness: Vec<(f64, f64)> = normals.iter().map(steepness).collect();
+    let mut steepness: Vec<(f64, f64)> = triangles().map(steepness).collect();
     let [p99] = quantiles(&mut steepness, [0.99]);
     if p99 > most {
         return None;
     }
-    let axes = perpendicular(axis);
-    let origin = mesh.points()[chart.vertices().first()?.index()];
-    let place = |x: Vec3| axes.map(|a| dot(sub(x, origin), a));
-    let mut places: Vec<[f64; 2]> = chart.vertices().iter().map(|v| place(mesh.points()[v.index()])).collect();
+    let mut places: Vec<[f64; 2]> = chart.vertices().iter().map(|v| plane.place(mesh.points()[v.index()])).collect();
     for (_, sides) in chart.edges().iter() {
         let [h, t] = [sides[0], sides[0].next()];
         let ends = [chart.from(h), chart.from(t)].map(|v| places[v.index()]);
         places.push([0, 1].map(|k| 0.5 * (ends[0][k] + ends[1][k])));
     }
     certified(chart, &places)
-}
-
-fn doubled_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
-    cross(sub(b, a), sub(c, a))
 }

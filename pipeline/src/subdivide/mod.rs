@@ -129,12 +129,12 @@ impl LinearAtlas {
         self.charts.iter().map(|c| c.triangles.len()).sum()
     }
 
-    /// The charts that are handed over by the map that was given for them.
+    /// The charts that are handed over by the map that was given for them, ascending.
     pub fn straight_charts(&self) -> &[ChartId] {
         &self.straight
     }
 
-    /// The charts that are handed over by their linear map.
+    /// The charts that are handed over by their linear map, ascending.
     pub fn linear_charts(&self) -> &[ChartId] {
         &self.linear
     }
@@ -184,7 +184,7 @@ pub fn subdivide(
     mesh: &SurfaceMesh,
     charts: &[Chart],
     maps: &[CertifiedChart],
-    straight: &[Option<StraightMap>],
+    straight: &[Option<&StraightMap>],
     network: &SeamNetwork,
 ) -> Result<LinearAtlas, Error> {
     assert_eq!([maps.len(), straight.len()], [charts.len(); 2], "maps for every chart");
@@ -244,11 +244,11 @@ fn split(
     mesh: &SurfaceMesh,
     charts: &[Chart],
     maps: &[CertifiedChart],
-    straight: &[Option<StraightMap>],
+    straight: &[Option<&StraightMap>],
     network: &SeamNetwork,
 ) -> Result<Split, Error> {
     let certified = |c: usize| Proven::Quadratic(Cow::Borrowed(&maps[c].certified));
-    let first = |c: usize| match &straight[c] {
+    let first = |c: usize| match straight[c] {
         Some(map) => (HandedOver::Straight, Proven::Straight(map)),
         None => (HandedOver::Certified, certified(c)),
     };

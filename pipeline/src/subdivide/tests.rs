@@ -26,7 +26,8 @@ impl Sample {
     }
 
     fn subdivide(&self) -> Result<LinearAtlas, Error> {
-        subdivide(&self.mesh, self.atlas.charts(), &self.maps, &self.straight, &self.network)
+        let straight: Vec<Option<&StraightMap>> = self.straight.iter().map(Option::as_ref).collect();
+        subdivide(&self.mesh, self.atlas.charts(), &self.maps, &straight, &self.network)
     }
 
     /// Subdivides, and looks at all that is promised.
