@@ -1,5 +1,7 @@
 //! One chart through the stages: linear map, quadratic map, untangling, certificate.
 
+mod cut;
+
 use crate::atlas::Chart;
 use crate::boundary::{Boundary, Mids};
 use crate::certify::{self, CertifiedMap, PlanarMap, prove};
@@ -10,10 +12,10 @@ use crate::grid::GridPoint;
 use crate::host::{Alone, Cancelled, Host, Pace};
 use crate::linear::{self, LinearMap, linear_map, lower_ears};
 use crate::mesh::SurfaceMesh;
-use crate::natural;
 use crate::quadratic::{QuadraticMap, least_det, quadratic_map};
 use crate::sparse;
 use crate::untangle::{self, Untangled, untangle};
+use cut::Cutter;
 
 /// The order of the finite elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -36,6 +38,19 @@ pub struct MappedChart {
     harmonic: Option<Result<QuadraticMap, sparse::Error>>,
 }
 
+impl MappedChart {
+    /// The conformal distortion that 99 % of the area does not exceed: for charts with holes in the harmonic map, where there is
+    /// one (untangling changes it little, and takes long where it is large), for others in the raised linear map. Noise makes
+    /// many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
+    fn conformal_p99(&self, chart: &Chart) -> f64 {
+        let nodes = match &self.harmonic {
+            Some(Ok(map)) if !chart.holes().is_empty() => map.nodes(),
+            _ => &self.start,
+        };
+        distortion::conformal_p99_of_nodes(chart, |f| self.closed.nodes(f).map(|n| nodes[n]))
+    }
+}
+
 /// Why a chart cannot be mapped as a whole. All but the last mean: split it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
@@ -56,6 +71,13 @@ pub enum MapError {
     /// The map was not wanted any more.
     #[error("the map was cancelled")]
     Cancelled,
+}
+
+impl MapError {
+    /// Per triangle, the logarithm of the area scale around it, where the chart has a map.
+    fn log_scales(&self) -> Option<&[f64]> {
+        if let Self::Stretched { log_scales, .. } = self { Some(log_scales) } else { None }
+    }
 }
 
 impl From<Cancelled> for MapError {
@@ -140,8 +162,8 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64, host: &dyn H
 const HOPELESS: f64 = 10.0;
 
 /// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, would be more distorted
-/// than `settings` allow, or is a ring that neither the disk nor the plane suits, until every part is right. Ends because
-/// parts are smaller, and single triangles map.
+/// than `settings` allow, or where neither the disk nor the plane suits it but its parts, until every part is right. Ends
+/// because parts are smaller, and single triangles map.
 ///
 /// # Errors
 /// [`SplitError`].
@@ -152,6 +174,7 @@ pub fn map_or_split(
     settings: &decompose::Settings,
     host: &dyn Host,
 ) -> Result<Vec<(Chart, MappedChart)>, SplitError> {
+    let cutter = Cutter { mesh, order, settings, host };
     let mut mapped = Vec::new();
     let mut waiting = vec![chart];
     while let Some(chart) = waiting.pop() {
@@ -161,11 +184,8 @@ pub fn map_or_split(
         }
         let error = match map_within(&chart, order, settings.max_area_ratio, host) {
             Ok(map) => {
-                match strips(mesh, &chart, &map, host) {
-                    Some(is_left) => {
-                        let parts = decompose::halve(mesh, &chart, &is_left, settings, host)?;
-                        waiting.extend(parts.into_iter().rev());
-                    }
+                match cutter.parts(&chart, &map)? {
+                    Some(parts) => mapped.extend(parts),
                     None => mapped.push((chart, map)),
                 }
                 continue;
@@ -173,39 +193,13 @@ pub fn map_or_split(
             Err(MapError::Cancelled) => return Err(SplitError::Cancelled),
             Err(error) => error,
         };
-        let scales = if let MapError::Stretched { log_scales, .. } = &error { Some(&log_scales[..]) } else { None };
-        match decompose::split(mesh, &chart, scales, settings, host)? {
+        match decompose::split(mesh, &chart, error.log_scales(), settings, host)? {
             Some(parts) => waiting.extend(parts.into_iter().rev()),
             // A single triangle: its map is what it is.
             None => mapped.push((chart.clone(), map_within(&chart, order, f64::INFINITY, host)?)),
         }
     }
     Ok(mapped)
-}
-
-/// Rings whose linear map stretches more than this on a hundredth of their area are cut, unless they have a natural map: those of
-/// thingi_1514499 and milk_truck are at 1e5 and 2e6; hills of a terrain, at 10, are well left whole.
-const TORN: f64 = 100.0;
-
-/// For a ring that neither the disk nor the plane suits, per triangle whether it lies left of a line through the hole. Two
-/// strips, each of which can be unrolled, come of a tube; coarse facets along it fold in one map.
-fn strips(mesh: &SurfaceMesh, chart: &Chart, map: &MappedChart, host: &dyn Host) -> Option<Vec<bool>> {
-    let start = &map.certified_start;
-    let [centre] = start.certificate().hole_centres[..] else { return None };
-    let on_disk = distortion::summary(chart, start, &distortion::fields(chart, start)).conformal_p99;
-    if on_disk <= TORN || natural::natural(mesh, chart, on_disk, host).is_some() {
-        return None;
-    }
-    let centre = centre.uv();
-    let node = |n: u32| start.map().nodes[n as usize].uv();
-    // The line runs through the middle of the disk, too.
-    let along = if centre == [0.0; 2] { [1.0, 0.0] } else { centre };
-    let is_left = |cell: &[u32; 6]| {
-        let sum = cell[..3].iter().map(|n| node(*n)).fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]);
-        let from = [0, 1].map(|k| sum[k] / 3.0 - centre[k]);
-        along[0] * from[1] > along[1] * from[0]
-    };
-    Some(start.map().cells.iter().map(is_left).collect())
 }
 
 /// Why a chart has no map, split or not.
@@ -370,6 +364,24 @@ mod tests {
         }
         let (_, whole) = parts(&tube(36, 6, 3.0));
         assert_eq!(whole.len(), 1, "nothing stretches there");
+    }
+
+    /// Four walls of two facets each, and a lid: its corners keep it from being unrolled in one part.
+    fn open_box(height: f64) -> TriangleSoup {
+        let corner = |k: u32| [f64::from(k & 1), f64::from(k >> 1 & 1), height * f64::from(k >> 2)];
+        let quads: [[u32; 4]; 5] = [[0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6], [4, 5, 7, 6]];
+        let halves = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+        TriangleSoup::new((0..8).map(corner).collect(), halves.collect()).expect("sound")
+    }
+
+    #[test]
+    fn a_tall_box_falls_into_parts_that_unroll_and_a_low_one_stays_whole() {
+        let (mesh, walls) = parts(&open_box(100.0));
+        assert!((2..=3).contains(&walls.len()), "{}", walls.len());
+        let unrolls = |part| crate::natural::natural(&mesh, part, f64::MAX, &Alone).is_some();
+        assert!(walls.iter().all(unrolls));
+        let (_, whole) = parts(&open_box(12.0));
+        assert_eq!(whole.len(), 1, "it stretches, but no more than others");
     }
 
     #[test]

@@ -105,6 +105,16 @@ pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summ
     Summary { conformal_median, conformal_p99, area_ratio: area_ratio(chart, map) }
 }
 
+/// The conformal distortion that 99 % of the area does not exceed, of a map that may be invalid here and there, by the nodes of
+/// each triangle of the chart: invalid triangles count as stretched without bound.
+pub(crate) fn conformal_p99_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [GridPoint; 6]) -> f64 {
+    let all_flagged = chart.flagged().iter().all(|f| *f);
+    let counted = (0..chart.triangles().len()).filter(|f| all_flagged || !chart.flagged()[*f]);
+    let weighted = |f: usize| (conformal_distortion(chart, f, nodes(f).map(|n| n.uv())), chart.shapes()[f].area());
+    let [p99] = quantiles(&mut counted.map(weighted).collect::<Vec<_>>(), [0.99]);
+    p99
+}
+
 /// Per vertex, the area scale of its star of two rings, with the area of its own star as weight; `plane` are the areas
 /// of the triangles in the plane.
 fn star_scales(chart: &Chart, plane: &[f64]) -> Vec<(f64, f64)> {

@@ -8,7 +8,8 @@
 //!    triangles may be invalid.
 //! 4. [`finish_chart`] makes them valid ([`mod@untangle`]) while keeping the Dirichlet energy as low as it can be, and
 //!    proves the result one-to-one ([`certify`]). Charts whose maps stretch too much are split, before it
-//!    ([`map_or_split`]) or, where only the result shows it, after it ([`finish_or_split`]).
+//!    ([`map_or_split`]; there charts that no mesher could follow are cut, too) or, where only the result shows it, after
+//!    it ([`finish_or_split`]).
 //! 5. [`distortion`] measures what came out; [`seams`] finds the curves between charts.
 //! 6. [`mod@subdivide`] makes linear triangulations of certified maps, for meshers.
 //!

@@ -1,0 +1,158 @@
+//! Cutting charts that are no use to a mesher into parts that can be laid out flat.
+//!
+//! Some charts have a certified map that no mesher can follow: a tube of long facets, the inside of a housing with
+//! eleven holes, whatever was triangulated by needles. Their maps stretch a hundredth of their area a hundred times and
+//! more, and they have no [`natural`] map, either. In strips they mostly have one. So such charts are cut: through a
+//! hole, where there is one, which makes two strips of a tube; otherwise where the area scale changes.
+//!
+//! Cutting is no end in itself: more charts mean more curves on which the nodes of a mesh are bound to lie. A cut is
+//! tried, and taken only where all parts suit a mesher and are few.
+
+use super::{MapError, MappedChart, Order, SplitError, map_within};
+use crate::atlas::Chart;
+use crate::decompose;
+use crate::distortion;
+use crate::host::Host;
+use crate::mesh::SurfaceMesh;
+use crate::natural;
+
+/// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
+/// of a terrain, at 10 to 50, and soccerball_g31, at 80, are well left whole.
+const STRETCHED: f64 = 100.0;
+
+/// From here on a chart cannot be meshed at all, and any cut is better than none. In most such maps a hundredth of the
+/// area is invalid before it is untangled: in 8 of 40 charts of imu_adis16480, and 5 of rear_case.
+const TORN: f64 = 1000.0;
+
+/// What the maps of all parts shall not exceed, unless they are natural. Where that takes too many parts, [`STRETCHED`]
+/// will do if some are natural: of the tubes of thingi_1514499, made of needles, one strip in two is not.
+const GOOD: f64 = 10.0;
+
+/// The largest number of parts for each hole of a chart, and for one without. The halves of the plate of genus 9 in
+/// tests/interop, at 400, would fall into 40 each, and are well meshed as they are.
+const FEW: usize = 3;
+
+/// The same for those that are torn. What was needed: 53 for three holes by menger_sponge3, whose long facets join
+/// across its openings, and 37 for four by the inside of imu_adis16480. A ring of fine triangles that falls into more
+/// (bent_disk) had better stay whole.
+const MANY: usize = 20;
+
+/// A chart and its map.
+type Mapped = (Chart, MappedChart);
+
+/// What cutting needs to know beside the chart.
+pub(super) struct Cutter<'a> {
+    pub(super) mesh: &'a SurfaceMesh,
+    pub(super) order: Order,
+    pub(super) settings: &'a decompose::Settings,
+    pub(super) host: &'a dyn Host,
+}
+
+/// By which map a mesher can follow a chart.
+#[derive(Clone, Copy, PartialEq)]
+enum Suits {
+    Natural,
+    Disk,
+    Neither,
+}
+
+impl Cutter<'_> {
+    /// The parts into which `chart` is to be cut; none where it suits a mesher as it is, or cutting does not help.
+    ///
+    /// # Errors
+    /// [`SplitError`].
+    pub(super) fn parts(&self, chart: &Chart, map: &MappedChart) -> Result<Option<Vec<Mapped>>, SplitError> {
+        let on_disk = map.conformal_p99(chart);
+        // Only a chart that the disk does not suit is asked for a natural map.
+        if on_disk <= STRETCHED || self.suits(chart, map, STRETCHED) == Suits::Natural {
+            return Ok(None);
+        }
+        let most = chart.holes().len().max(1) * if on_disk > TORN { MANY } else { FEW };
+        for bound in [GOOD, STRETCHED] {
+            if let Some((parts, naturals)) = self.parts_within(chart, map, bound, most)?
+                && (bound == GOOD || naturals > 0)
+            {
+                return Ok(Some(parts));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Parts whose maps stretch less than `bound` or are natural, and how many are natural; none where they are more
+    /// than `most`. Ends because parts are smaller, and a single triangle's map is what it is.
+    fn parts_within(
+        &self,
+        chart: &Chart,
+        map: &MappedChart,
+        bound: f64,
+        most: usize,
+    ) -> Result<Option<(Vec<Mapped>, usize)>, SplitError> {
+        let (mut done, mut naturals) = (Vec::new(), 0);
+        let Some(mut waiting) = self.halves(chart, map)? else { return Ok(None) };
+        while let Some(part) = waiting.pop() {
+            if done.len() + waiting.len() + 1 > most {
+                return Ok(None);
+            }
+            if let Some(ends) = decompose::contact(self.mesh, &part) {
+                waiting.extend(decompose::separate(self.mesh, &part, ends, self.settings, self.host)?);
+                continue;
+            }
+            let parts = match map_within(&part, self.order, self.settings.max_area_ratio, self.host) {
+                Ok(map) => {
+                    let suits = self.suits(&part, &map, bound);
+                    let parts = if suits == Suits::Neither { self.halves(&part, &map)? } else { None };
+                    if parts.is_none() {
+                        naturals += usize::from(suits == Suits::Natural);
+                        done.push((part, map));
+                        continue;
+                    }
+                    parts
+                }
+                Err(MapError::Cancelled) => return Err(SplitError::Cancelled),
+                Err(error) => decompose::split(self.mesh, &part, error.log_scales(), self.settings, self.host)?,
+            };
+            // A single triangle that has no map is left to the caller's rule for charts that do not map.
+            let Some(parts) = parts else { return Ok(None) };
+            waiting.extend(parts);
+        }
+        Ok(Some((done, naturals)))
+    }
+
+    fn suits(&self, chart: &Chart, map: &MappedChart, bound: f64) -> Suits {
+        let on_disk = map.conformal_p99(chart);
+        let natural = natural::natural(self.mesh, chart, on_disk, self.host);
+        if natural.is_some_and(|n| n.distortion.conformal_p99 <= bound) {
+            Suits::Natural
+        } else if on_disk <= bound {
+            Suits::Disk
+        } else {
+            Suits::Neither
+        }
+    }
+
+    /// The chart cut once: through its first hole, or where the area scale changes. None for a single triangle.
+    fn halves(&self, chart: &Chart, map: &MappedChart) -> Result<Option<Vec<Chart>>, decompose::Error> {
+        match left_of_hole(map) {
+            Some(is_left) => decompose::halve(self.mesh, chart, &is_left, self.settings, self.host).map(Some),
+            None => {
+                let scales = distortion::log_scales(chart, &map.certified_start);
+                decompose::split(self.mesh, chart, Some(&scales), self.settings, self.host)
+            }
+        }
+    }
+}
+
+/// Per triangle, whether it lies left of a line through the middle of the disk and that of the first hole, if there is
+/// one.
+fn left_of_hole(map: &MappedChart) -> Option<Vec<bool>> {
+    let start = &map.certified_start;
+    let centre = start.certificate().hole_centres.first()?.uv();
+    let node = |n: u32| start.map().nodes[n as usize].uv();
+    let along = if centre == [0.0; 2] { [1.0, 0.0] } else { centre };
+    let is_left = |cell: &[u32; 6]| {
+        let sum = cell[..3].iter().map(|n| node(*n)).fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]);
+        let from = [0, 1].map(|k| sum[k] / 3.0 - centre[k]);
+        along[0] * from[1] > along[1] * from[0]
+    };
+    Some(start.map().cells.iter().map(is_left).collect())
+}
