@@ -3,8 +3,8 @@
 //! A disk makes every corner of a boundary a singularity, and stretches what is long: conformal distortions of 100 to
 //! 6,000 on the flat sides of CAD parts, and a mesher loses parts of such charts. Two maps do without a disk:
 //!
-//! - [`projection`]: along the mean of the normals, for what is nearly a plane;
-//! - [`conformal`]: least squares conformal (Levy, Petitjean, Ray and Maillot 2002, *Least squares conformal maps*, doi
+//! - [`projection()`]: along the mean of the normals, for what is nearly a plane;
+//! - [`conformal()`]: least squares conformal (Levy, Petitjean, Ray and Maillot 2002, *Least squares conformal maps*, doi
 //!   10.1145/566654.566590; the energy as in Mullen, Tong, Alliez and Desbrun 2008, doi 10.1111/j.1467-8659.2008.01289.x), with
 //!   a free boundary: what can be unrolled without stretching is. On the four parts of each triangle: coarse needles fold
 //!   without them.

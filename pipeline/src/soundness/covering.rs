@@ -1,7 +1,7 @@
 //! Does the mesh of a chart cover it once? In the map that the mesher used.
 //!
 //! Every triangle must be positive in the plane, and the boundary of the mesh simple and rightly nested there: then the
-//! mesh covers what the boundary encloses, once (see [`super::loops`]). Decided exactly, on places rounded to the grid.
+//! mesh covers what the boundary encloses, once (see [`crate::certify::polygons`]). Decided exactly, on places rounded to the grid.
 //!
 //! Nodes on curves are placed on the chart's boundary in the plane, by where they lie on the curve; all others where the
 //! closest point of the chart is. A flat chart is its own map, whatever the other one does: Gmsh takes the plane of such
