@@ -1,13 +1,17 @@
 //! Publishing: files are complete in the output folder, or not there.
 //!
 //! The files of an input are written to a staging folder (`OUT/.planish/...`), brought to disk, and renamed into
-//! place in one step; an older result stays until then. Each process has a staging folder of its own, held by a
+//! place in one step; an older result stays until then, and what is not planish's in it moves on ([`crate::replace`]). Each process has a staging folder of its own, held by a
 //! lock; folders whose process is gone are cleared at the next start. What is published is the ledger of what was done:
 //! see [`crate::ledger`].
 
+use crate::own;
+use crate::replace::{self, NotKept};
 use crate::shown::shown;
 use parking_lot::Mutex;
-use std::fs::{self, File, TryLockError};
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
@@ -16,6 +20,9 @@ pub const STAGING: &str = ".planish";
 
 /// The file whose lock tells that a staging folder is in use.
 const LOCK: &str = "lock";
+
+/// How the names of staging folders begin.
+const RUN: &str = "run-";
 
 /// The file whose lock a process holds while it makes its staging folder.
 const GATE: &str = "opening";
@@ -50,6 +57,18 @@ pub enum PublishError {
         shown(.0)
     )]
     Foreign(PathBuf),
+    /// Something in an older result is not planish's, and cannot be kept.
+    #[error(
+        "{} lies in an older result, is not of planish, and cannot be kept in the newer one: the older result was left \
+         alone; move that away", shown(.0)
+    )]
+    Stands(PathBuf),
+    /// Another process holds a lock.
+    #[error(
+        "{} has been locked by another process for {} s: find it with `fuser -v` and end it, or use another output \
+         folder", shown(.0), own::PATIENCE.as_secs()
+    )]
+    Busy(PathBuf),
     /// A folder on the way is itself a result.
     #[error("{} is the result of an input: another result cannot lie in it; rename the folder in the inbox", shown(.0))]
     Nested(PathBuf),
@@ -58,7 +77,7 @@ pub enum PublishError {
 impl PublishError {
     /// Whether it stays as long as nobody changes something.
     pub fn is_lasting(&self) -> bool {
-        matches!(self, Self::Foreign(_) | Self::Nested(_))
+        matches!(self, Self::Foreign(_) | Self::Nested(_) | Self::Stands(_))
     }
 }
 
@@ -75,14 +94,14 @@ impl Publisher {
     /// [`PublishError`] where the folder cannot be written.
     pub fn open(out: &Path) -> Result<Self, PublishError> {
         let staging = out.join(STAGING);
-        fs::create_dir_all(&staging).map_err(at(&staging))?;
+        own::folder(&staging).map_err(at(&staging))?;
         // One process at a time, so that a folder is never seen between being made and being locked.
-        let gate = staging.join(GATE);
-        let _opening = File::create(&gate).and_then(|f| f.lock().map(|()| f)).map_err(at(&gate))?;
+        let _opening = pass_gate(out, || true)?.ok_or_else(|| PublishError::Busy(staging.join(GATE)))?;
         clear_stale(&staging);
-        let own = tempfile::Builder::new().prefix("run-").tempdir_in(&staging).map_err(at(&staging))?;
+        let own = tempfile::Builder::new().prefix(RUN).tempdir_in(&staging).map_err(at(&staging))?;
         let path = own.path().join(LOCK);
-        let lock = File::create(&path).and_then(|f| f.lock().map(|()| f)).map_err(at(&path))?;
+        // It is new, and nobody else's.
+        let lock = own::lock_file(own.path(), LOCK).and_then(|f| f.lock().map(|()| f)).map_err(at(&path))?;
         Ok(Self { out: out.to_owned(), staging: own, open: Mutex::new(true), _lock: lock })
     }
 
@@ -118,16 +137,24 @@ impl Publisher {
         }
         sync_folder(&fresh).map_err(at(&fresh))?;
         // One at a time, of all processes, so that what is no longer wanted never takes the place of what came after it.
+        // Nobody who closes is kept waiting by a lock.
+        let is_wanted = || *self.open.lock() && wanted();
+        let Some(_alone) = pass_gate(&self.out, is_wanted)? else {
+            return if is_wanted() { Err(PublishError::Busy(self.out.join(STAGING).join(GATE))) } else { Ok(false) };
+        };
         let open = self.open.lock();
-        let gate = self.out.join(STAGING).join(GATE);
-        let _alone = File::create(&gate).and_then(|f| f.lock().map(|()| f)).map_err(at(&gate))?;
         if !*open || !wanted() {
             return Ok(false);
         }
         // Writing took its time: somebody may have put something there.
         self.admits(name)?;
         let folder = self.folder_for(name)?;
-        put_in_place(&fresh, &target, parent.path()).map_err(at(&target))?;
+        let own = replace::own_files(&target).unwrap_or_default();
+        keep_foreign(&target, &own, &fresh, false)?;
+        if let Some(older) = put_in_place(&fresh, &target, parent.path()).map_err(at(&target))? {
+            // Nothing is lost of what was put there in this moment, either.
+            keep_foreign(&older, &own, &target, true)?;
+        }
         sync_folder(&folder).map_err(at(&folder)).map(|()| true)
     }
 
@@ -138,7 +165,7 @@ impl Publisher {
     pub fn admits(&self, name: &Path) -> Result<(), PublishError> {
         let target = self.target(name);
         let parents = name.ancestors().skip(1).filter(|p| !p.as_os_str().is_empty()).map(|p| self.out.join(p));
-        if let Some(result) = parents.into_iter().find(|p| p.join(crate::report::FILE).is_file()) {
+        if let Some(result) = parents.into_iter().find(|p| replace::own_files(p).is_some()) {
             return Err(PublishError::Nested(result));
         }
         if is_plain(name) && may_be_replaced(&target) { Ok(()) } else { Err(PublishError::Foreign(target)) }
@@ -173,15 +200,37 @@ fn is_plain(name: &Path) -> bool {
     name.components().all(|part| matches!(part, Component::Normal(_))) && name.file_name().is_some()
 }
 
-/// Whether nothing is there, or an older result (a folder with a report), or an empty folder.
+/// Whether nothing is there, or an older result (a folder with a report of planish), or an empty folder.
 fn may_be_replaced(target: &Path) -> bool {
     match fs::symlink_metadata(target) {
         Err(e) => e.kind() == io::ErrorKind::NotFound,
         Ok(m) if !m.is_dir() => false,
-        Ok(_) => {
-            target.join(crate::report::FILE).is_file() || fs::read_dir(target).is_ok_and(|mut d| d.next().is_none())
-        }
+        Ok(_) => replace::own_files(target).is_some() || fs::read_dir(target).is_ok_and(|mut d| d.next().is_none()),
     }
+}
+
+/// What lies in the folder `older`, if that is there, and is not planish's own, gets a place in `fresh`, too.
+fn keep_foreign(older: &Path, own: &BTreeSet<OsString>, fresh: &Path, again: bool) -> Result<(), PublishError> {
+    if !older.is_dir() {
+        return Ok(());
+    }
+    let kept = replace::keep_foreign(older, own, fresh, again).map_err(|e| match e {
+        NotKept::Stands(path) => PublishError::Stands(path),
+        NotKept::Io(path, error) => PublishError::Io { path, error },
+    })?;
+    if kept > 0 {
+        tracing::info!(result = shown(fresh), kept, "files that planish did not write stay in the result");
+    }
+    Ok(())
+}
+
+/// Opens and locks the gate of an output folder, as long as that is `wanted`; none where another process holds it for
+/// too long.
+fn pass_gate(out: &Path, wanted: impl Fn() -> bool) -> Result<Option<File>, PublishError> {
+    let folder = out.join(STAGING);
+    let path = folder.join(GATE);
+    let gate = own::lock_file(&folder, GATE).map_err(at(&path))?;
+    Ok(own::lock(&gate, &path, wanted).map_err(at(&path))?.then_some(gate))
 }
 
 fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -195,22 +244,22 @@ fn sync_folder(path: &Path) -> io::Result<()> {
 }
 
 /// Renames `fresh` to `target` in one step. Where there is an older result the two change places, and the older one
-/// goes with the staging folder. Another process may put one there, or take it away, at any moment: then the other
+/// goes with the staging folder; where that lies now. Another process may put one there, or take it away, at any moment: then the other
 /// way is tried, a few times.
 #[cfg(target_os = "linux")]
-fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<()> {
+fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<Option<PathBuf>> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
     use rustix::io::Errno;
     for _ in 0..16 {
         match renameat_with(CWD, fresh, CWD, target, RenameFlags::NOREPLACE) {
             Err(Errno::EXIST | Errno::NOTEMPTY) => {}
             Err(Errno::INVAL | Errno::NOSYS) => break,
-            ended => return Ok(ended?),
+            ended => return Ok(ended.map(|()| None)?),
         }
         match renameat_with(CWD, fresh, CWD, target, RenameFlags::EXCHANGE) {
             Err(Errno::NOENT) => {}
             Err(Errno::INVAL | Errno::NOSYS) => break,
-            ended => return Ok(ended?),
+            ended => return Ok(ended.map(|()| Some(fresh.to_owned()))?),
         }
     }
     put_in_place_in_two_steps(fresh, target, staging)
@@ -218,25 +267,34 @@ fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<()> {
 
 /// Where the system cannot exchange two folders, the older one is moved away first.
 #[cfg(not(target_os = "linux"))]
-fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<()> {
+fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<Option<PathBuf>> {
     put_in_place_in_two_steps(fresh, target, staging)
 }
 
-fn put_in_place_in_two_steps(fresh: &Path, target: &Path, staging: &Path) -> io::Result<()> {
-    match fs::rename(target, staging.join("older")) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
-        _ => fs::rename(fresh, target),
-    }
+fn put_in_place_in_two_steps(fresh: &Path, target: &Path, staging: &Path) -> io::Result<Option<PathBuf>> {
+    let older = staging.join("older");
+    let moved = match fs::rename(target, &older) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+        moved => moved.is_ok(),
+    };
+    fs::rename(fresh, target).map(|()| moved.then_some(older))
 }
 
-/// Removes staging folders whose lock nobody holds.
+/// Removes staging folders that are ours and whose lock nobody holds, and those that were made and never locked, which
+/// are empty. All else that lies there stays.
 fn clear_stale(staging: &Path) {
     let Ok(entries) = fs::read_dir(staging) else { return };
-    for folder in entries.flatten().map(|e| e.path()).filter(|p| p.is_dir()) {
-        let lock = File::open(folder.join(LOCK));
-        let held = lock.as_ref().is_ok_and(|f| matches!(f.try_lock(), Err(TryLockError::WouldBlock)));
-        if !held && let Err(error) = fs::remove_dir_all(&folder) {
-            tracing::warn!(folder = shown(&folder), %error, "cannot clear an abandoned staging folder");
+    let is_run =
+        |e: &fs::DirEntry| e.file_type().is_ok_and(|t| t.is_dir()) && e.file_name().to_string_lossy().starts_with(RUN);
+    for folder in entries.flatten().filter(is_run).map(|e| e.path()) {
+        let removed = match own::lock_file_there(&folder, LOCK).map(|lock| lock.try_lock().is_ok()) {
+            Ok(true) => fs::remove_dir_all(&folder),
+            Ok(false) => Ok(()),
+            // Fails where something is in it.
+            Err(_) => fs::remove_dir(&folder),
+        };
+        if let Err(error) = removed {
+            tracing::warn!(folder = shown(&folder), "an abandoned staging folder is left alone: {error}");
         }
     }
 }
@@ -245,8 +303,16 @@ fn clear_stale(staging: &Path) {
 mod tests {
     use super::*;
 
+    /// A report of planish that names these files, and the files.
+    fn result(of: &[(&str, &str)]) -> Vec<(String, Vec<u8>)> {
+        let files = || of.iter().map(|(name, text)| ((*name).to_owned(), text.as_bytes().to_vec()));
+        let outputs: Vec<_> = files().map(|(name, text)| crate::report::Output::of(&name, &text)).collect();
+        let report = serde_json::json!({"schema": 1, "planish": "1", "status": "certified", "outputs": outputs});
+        files().chain([(crate::report::FILE.to_owned(), report.to_string().into_bytes())]).collect()
+    }
+
     fn files(text: &str) -> Vec<(String, Vec<u8>)> {
-        vec![(crate::report::FILE.to_owned(), text.into()), ("b.txt".to_owned(), text.into())]
+        result(&[("b.txt", text)])
     }
 
     #[test]
@@ -254,8 +320,7 @@ mod tests {
         let out = tempfile::tempdir().expect("a folder");
         let publisher = Publisher::open(out.path()).expect("opens");
         let name = Path::new("part.stl");
-        let mut old = files("old");
-        old.push(("only-old.txt".to_owned(), vec![]));
+        let old = result(&[("b.txt", "old"), ("only-old.txt", "")]);
         publisher.publish(name, &old, || true).expect("published");
         publisher.publish(name, &files("new"), || true).expect("published");
         let target = publisher.target(name);
@@ -339,6 +404,9 @@ mod tests {
         assert!(out.path().join("a/b/part.stl/b.txt").exists());
         let nested = publisher.publish(Path::new("a/b/part.stl/c.stl"), &files("new"), || true);
         assert!(matches!(nested, Err(PublishError::Nested(_))), "{nested:?}");
+        fs::create_dir(out.path().join("other")).expect("made");
+        fs::write(out.path().join("other").join(crate::report::FILE), "{}").expect("written");
+        assert!(publisher.publish(Path::new("other/c.stl"), &files("new"), || true).is_ok(), "that is no result");
     }
 
     #[test]

@@ -6,7 +6,9 @@
 use crate::conveyor::board::Running;
 use crate::look::Identity;
 use crate::outcome::{Code, Status as Outcome};
+use crate::own;
 use crate::publish::STAGING;
+use crate::regular::{self, OpenError};
 use crate::shown::shown;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
@@ -19,6 +21,9 @@ const LOCK_FILE: &str = "watch.lock";
 
 /// The file that tells what the daemon does.
 const STATUS: &str = "status.json";
+
+/// A longer status is none: it names a hundred inputs, and what runs.
+const LONGEST: u64 = 64 << 20;
 
 /// Names of waiting inputs that are told; all are counted.
 pub const NAMED: usize = 100;
@@ -148,7 +153,7 @@ impl Lock {
     pub fn take(out: &Path) -> Result<Self, LockError> {
         let path = out.join(STAGING).join(LOCK_FILE);
         let failed = |error| LockError::Io { path: path.clone(), error };
-        let lock = File::options().create(true).append(true).open(&path).map_err(failed)?;
+        let lock = own::lock_file(&out.join(STAGING), LOCK_FILE).map_err(failed)?;
         match try_lock(&lock) {
             Ok(()) => Ok(Self { status: out.join(STAGING).join(STATUS), lock }),
             Err(TryLockError::WouldBlock) => {
@@ -196,13 +201,25 @@ fn try_lock(lock: &File) -> Result<(), TryLockError> {
 
 /// What the last daemon told; none: it ended in order, or there never was one.
 pub fn told(out: &Path) -> Option<Status> {
-    serde_json::from_slice(&fs::read(out.join(STAGING).join(STATUS)).ok()?).ok()
+    let file = regular::open_itself(&out.join(STAGING).join(STATUS)).ok()?;
+    serde_json::from_slice(&regular::read(&file, LONGEST).ok()?).ok()
 }
 
-/// Whether a daemon runs.
+/// Whether a daemon runs. Who may not read its lock (that of another user) goes by the process that it named.
 pub fn is_running(out: &Path) -> bool {
-    let lock = File::open(out.join(STAGING).join(LOCK_FILE));
-    lock.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    match regular::open_itself(&out.join(STAGING).join(LOCK_FILE)) {
+        Ok(lock) => matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)),
+        Err(OpenError::Io(e)) if e.kind() == io::ErrorKind::PermissionDenied => {
+            told(out).is_some_and(|s| is_alive(s.pid))
+        }
+        Err(_) => false,
+    }
+}
+
+fn is_alive(pid: u32) -> bool {
+    let process = i32::try_from(pid).ok().and_then(rustix::process::Pid::from_raw);
+    // Who may not send it a signal learns that it is there, too.
+    process.is_some_and(|p| !matches!(rustix::process::test_kill_process(p), Err(rustix::io::Errno::SRCH)))
 }
 
 #[cfg(test)]
@@ -223,8 +240,10 @@ mod tests {
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
-            let mode = |name: &str| fs::metadata(staging.join(name)).expect("there").permissions().mode();
-            assert_eq!(mode(STATUS), mode(LOCK_FILE), "the same may read both");
+            let mode = |name: &str| fs::metadata(staging.join(name)).expect("there").permissions().mode() & 0o777;
+            // Who may read a file may lock it; the status is not locked, and for all who may read results.
+            assert_eq!((mode(LOCK_FILE), mode(STATUS) & 0o600), (0o600, 0o600));
+            assert_eq!(mode(STATUS), fs::write(staging.join("new"), "").map(|()| mode("new")).expect("written"));
         }
         assert!(matches!(Lock::take(out.path()), Err(LockError::Busy { pid: Some(42), .. })));
         drop(daemon);

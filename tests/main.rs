@@ -7,6 +7,7 @@ mod daemon;
 mod doubts;
 mod every_mesh;
 mod fixtures;
+mod foreign;
 mod fuzz;
 mod interop;
 mod invariants;

@@ -1,0 +1,159 @@
+//! Folders and lock files of our own, in places where others may write.
+//!
+//! Whoever may write to an output folder may have put there, under our names, a link to what must not be touched, a
+//! pipe that would never open, or a folder with work. So nothing is opened by following a link, nothing is emptied, and
+//! only what is a real folder or a regular file is taken for ours. And whoever may read a file may lock it: lock files
+//! are readable by their owner only, and nobody waits for a lock for ever.
+
+use rustix::fs::{CWD, FileType, Mode, OFlags, fchmod, fstat, openat};
+use rustix::io::Errno;
+use std::fs::{self, File, TryLockError};
+use std::io::{self, ErrorKind};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Others may neither read nor write.
+const PRIVATE: Mode = Mode::RUSR.union(Mode::WUSR);
+
+/// How long a lock is waited for. Whoever holds one does so for milliseconds, but a disk may be slow.
+pub const PATIENCE: Duration = Duration::from_secs(10);
+
+/// The longest pause between two looks at a lock.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// Makes the folder at `path`, and those above it, unless a real one is there.
+///
+/// # Errors
+/// The system refuses, or something else is there: a link, too.
+pub fn folder(path: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(path) {
+        Ok(there) if there.is_dir() => Ok(()),
+        Ok(_) => Err(io::Error::other("it is no folder, or a link to one; remove it, or use another output folder")),
+        Err(e) if e.kind() == ErrorKind::NotFound => {
+            fs::create_dir_all(path.parent().unwrap_or(path))?;
+            match fs::create_dir(path) {
+                // Another process was faster: it is looked at as any other.
+                Err(e) if e.kind() == ErrorKind::AlreadyExists => folder_is_real(path),
+                made => made,
+            }
+        }
+        Err(e) => Err(e),
+    }
+}
+
+fn folder_is_real(path: &Path) -> io::Result<()> {
+    if fs::symlink_metadata(path)?.is_dir() { Ok(()) } else { Err(ErrorKind::NotADirectory.into()) }
+}
+
+/// Opens the lock file `name` in `folder`; makes it where it is missing. Nothing in it changes, and only its owner may
+/// read it afterwards.
+///
+/// # Errors
+/// The system refuses, or it is no regular file.
+pub fn lock_file(folder: &Path, name: &str) -> io::Result<File> {
+    open_lock(folder, name, OFlags::CREATE)
+}
+
+/// As [`lock_file`], of a file that is there.
+///
+/// # Errors
+/// As [`lock_file`].
+pub fn lock_file_there(folder: &Path, name: &str) -> io::Result<File> {
+    open_lock(folder, name, OFlags::empty())
+}
+
+fn open_lock(folder: &Path, name: &str, more: OFlags) -> io::Result<File> {
+    let common = OFlags::CLOEXEC | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::NOCTTY;
+    let folder = openat(CWD, folder, common | OFlags::DIRECTORY, Mode::empty())?;
+    // To read and to write: so a pipe opens at once, and is told from a file then.
+    let file = openat(&folder, name, common | OFlags::RDWR | more, PRIVATE).map_err(|e| match e {
+        Errno::LOOP => io::Error::other("it is a link, which is not followed; remove it"),
+        e => e.into(),
+    })?;
+    let found = fstat(&file)?;
+    if FileType::from_raw_mode(found.st_mode) != FileType::RegularFile {
+        return Err(io::Error::other("it is no regular file; remove it"));
+    }
+    if Mode::from_raw_mode(found.st_mode) != PRIVATE {
+        // Of an older version, or of somebody else, whose permissions are not ours to change.
+        let _ = fchmod(&file, PRIVATE);
+    }
+    Ok(File::from(file))
+}
+
+/// Locks a file within [`PATIENCE`], as long as that is `wanted`; whether it is locked. That it takes long is told once,
+/// with the name of the file. Ends: the time runs out.
+///
+/// # Errors
+/// The system refuses.
+pub fn lock(file: &File, path: &Path, wanted: impl Fn() -> bool) -> io::Result<bool> {
+    lock_within(file, path, PATIENCE, wanted)
+}
+
+fn lock_within(file: &File, path: &Path, patience: Duration, wanted: impl Fn() -> bool) -> io::Result<bool> {
+    let began = Instant::now();
+    let (mut pause, mut is_told) = (Duration::from_millis(1), false);
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Ok(true),
+            Err(TryLockError::Error(error)) => return Err(error),
+            Err(TryLockError::WouldBlock) if !wanted() || began.elapsed() >= patience => return Ok(false),
+            Err(TryLockError::WouldBlock) => {}
+        }
+        if began.elapsed() > Duration::from_secs(1) && !std::mem::replace(&mut is_told, true) {
+            tracing::warn!(lock = crate::shown::shown(path), "waits for a lock that another process holds");
+        }
+        std::thread::sleep(pause);
+        pause = PAUSE.min(2 * pause);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustix::fs::mknodat;
+    use std::os::unix::fs::{PermissionsExt, symlink};
+
+    #[test]
+    fn a_lock_file_is_private_keeps_its_content_and_is_no_link_and_no_pipe() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("old"), "content").expect("written");
+        lock_file(folder.path(), "old").expect("opens");
+        assert_eq!(fs::read_to_string(at("old")).expect("there"), "content");
+        lock_file(folder.path(), "new").expect("made");
+        for name in ["old", "new"] {
+            assert_eq!(fs::metadata(at(name)).expect("there").permissions().mode() & 0o777, 0o600, "{name}");
+        }
+        symlink("old", at("link")).expect("linked");
+        mknodat(CWD, at("pipe"), FileType::Fifo, PRIVATE, 0).expect("made");
+        for name in ["link", "pipe", "."] {
+            assert!(lock_file(folder.path(), name).is_err(), "{name}");
+        }
+        assert!(lock_file_there(folder.path(), "missing").is_err() && !at("missing").exists());
+        symlink(".", at("folder")).expect("linked");
+        assert!(lock_file(&at("folder"), "old").is_err(), "nor through a link");
+    }
+
+    #[test]
+    fn a_folder_is_made_and_a_link_is_none() {
+        let place = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| place.path().join(name);
+        folder(&at("a/b")).and_then(|()| folder(&at("a/b"))).expect("made, and there");
+        symlink("a", at("link")).expect("linked");
+        fs::write(at("file"), "").expect("written");
+        assert!(folder(&at("link")).is_err() && folder(&at("file")).is_err());
+    }
+
+    #[test]
+    fn waiting_for_a_lock_ends() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [held, other] = [(); 2].map(|()| lock_file(folder.path(), "lock").expect("opens"));
+        assert!(lock(&held, folder.path(), || true).expect("free"));
+        let patience = Duration::from_millis(30);
+        assert!(!lock_within(&other, folder.path(), patience, || true).expect("in vain"));
+        assert!(!lock(&other, folder.path(), || false).expect("nobody waits"));
+        drop(held);
+        assert!(lock(&other, folder.path(), || true).expect("free again"));
+    }
+}
