@@ -222,6 +222,7 @@ impl<'a> Daemon<'a> {
         self.status.next = waiting.iter().take(NAMED).map(|job| job.name.to_string_lossy().into_owned()).collect();
         self.status.running = self.conveyor.running().into_iter().map(Progress::from).collect();
         self.status.unsettled = self.inbox.unsettled();
+        self.status.log_lines_lost = crate::logging::lost();
         if let Err(error) = self.lock.tell(&self.status, self.staging) {
             tracing::warn!("the status for `planish status` cannot be written: {error}");
         }

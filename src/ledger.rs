@@ -1,6 +1,7 @@
 //! The ledger: which inputs are done. There is no other one than the published reports.
 
 use crate::outcome::{Reason, Status};
+use crate::regular::{self, OpenError};
 use crate::report::{self, Input, Output, Report};
 use crate::stages::{Folder, read_file};
 use serde::Deserialize;
@@ -19,9 +20,22 @@ pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Folder) -> Option<Repo
         && older.settings == fresh.settings
         && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
         && older.status != Status::Failed;
-    let there = |o: &Output| read_file(&folder.join(&o.file)).is_ok_and(|content| Output::of(&o.file, &content) == *o);
+    let there = |o: &Output| holds(folder, o).is_ok_and(|it_does| it_does);
     let complete = (older.status == Status::Certified) != older.outputs.is_empty();
     (same && complete && older.outputs.iter().all(there)).then_some(older)
+}
+
+/// Whether `folder` holds this file as it was published. One of another size is not read.
+///
+/// # Errors
+/// Why it cannot be read.
+pub fn holds(folder: &Path, output: &Output) -> Result<bool, OpenError> {
+    let file = regular::open(&folder.join(&output.file))?;
+    match regular::read(&file, output.bytes) {
+        Ok(content) => Ok(Output::of(&output.file, &content) == *output),
+        Err(OpenError::TooLarge { .. }) => Ok(false),
+        Err(error) => Err(error),
+    }
 }
 
 /// What a report says, in short.
@@ -59,6 +73,19 @@ pub fn entries(out: &Path) -> impl Iterator<Item = (PathBuf, Entry)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_that_has_grown_is_not_read() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let output = Output::of("a.vtu", b"content");
+        assert!(holds(folder.path(), &output).is_err(), "it is missing");
+        std::fs::write(folder.path().join("a.vtu"), "content").expect("written");
+        assert!(holds(folder.path(), &output).expect("there"));
+        // No memory holds this.
+        let grown = std::fs::File::create(folder.path().join("a.vtu")).expect("made");
+        grown.set_len(1 << 42).expect("sparse");
+        assert!(!holds(folder.path(), &output).expect("there"));
+    }
 
     #[test]
     fn all_results_are_found_and_nothing_else() {

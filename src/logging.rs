@@ -2,10 +2,29 @@
 
 use crate::settings::{Log, Settings};
 use std::io::IsTerminal;
+use std::sync::OnceLock;
 use tracing::level_filters::LevelFilter;
+use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
+use tracing_subscriber::fmt::writer::BoxMakeWriter;
 
-/// Starts logging; a daemon informs without being asked. A panic becomes a log message too: it is caught per job, and told there.
-pub fn start(settings: &Settings, is_daemon: bool) {
+/// So many messages of a daemon wait for standard error at most: a megabyte or two.
+const WAITING: usize = 10_000;
+
+/// Counts what was lost.
+static LOST: OnceLock<ErrorCounter> = OnceLock::new();
+
+/// How many messages were lost since the start, because nobody took them off standard error.
+pub fn lost() -> usize {
+    LOST.get().map_or(0, ErrorCounter::dropped_lines)
+}
+
+/// Starts logging; a daemon informs without being asked. A panic becomes a log message too: it is caught per job, and told
+/// there.
+///
+/// What a daemon says never holds up what it does: a reader of standard error that stands still costs messages, which are
+/// counted ([`lost`]). What still waits is written when the returned guard goes, within a second.
+#[must_use]
+pub fn start(settings: &Settings, is_daemon: bool) -> Option<WorkerGuard> {
     let level = match (settings.quiet, settings.verbose.saturating_add(u8::from(is_daemon))) {
         (true, _) => LevelFilter::ERROR,
         // What is refused is told by the summary already.
@@ -14,7 +33,8 @@ pub fn start(settings: &Settings, is_daemon: bool) {
         (false, 2) => LevelFilter::DEBUG,
         (false, _) => LevelFilter::TRACE,
     };
-    let builder = tracing_subscriber::fmt().with_max_level(level).with_writer(std::io::stderr).with_target(false);
+    let (writer, guard) = if is_daemon { aside() } else { (BoxMakeWriter::new(std::io::stderr), None) };
+    let builder = tracing_subscriber::fmt().with_max_level(level).with_writer(writer).with_target(false);
     // That a message is lost (a full disk, a closed pipe) is no reason to break down, as its complaint about that would.
     let builder = builder.with_ansi(std::io::stderr().is_terminal()).log_internal_errors(false);
     // A second call, as tests make it, keeps the first subscriber.
@@ -25,4 +45,13 @@ pub fn start(settings: &Settings, is_daemon: bool) {
     std::panic::set_hook(Box::new(|panic| {
         tracing::debug!(place = %panic.location().map(ToString::to_string).unwrap_or_default(), "panic: {panic}");
     }));
+    guard
+}
+
+/// A writer that hands messages to a thread, or counts them as lost.
+fn aside() -> (BoxMakeWriter, Option<WorkerGuard>) {
+    let builder = NonBlockingBuilder::default().lossy(true).buffered_lines_limit(WAITING).thread_name("log");
+    let (writer, guard) = builder.finish(std::io::stderr());
+    let _ = LOST.set(writer.error_counter());
+    (BoxMakeWriter::new(writer), Some(guard))
 }

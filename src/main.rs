@@ -9,7 +9,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let ended = cli.verb.settings().map_err(Into::into).and_then(|settings| {
-        logging::start(&settings, matches!(cli.verb, Verb::Watch(_)));
+        let _until_the_end = logging::start(&settings, matches!(cli.verb, Verb::Watch(_)));
         dispatch(&cli.verb, &settings)
     });
     ended

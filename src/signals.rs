@@ -1,14 +1,49 @@
-//! Ctrl-C and SIGTERM.
+//! Ctrl-C, SIGTERM and SIGHUP.
 
 use crate::watch::Stop;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 
-/// From now on Ctrl-C, SIGTERM and SIGHUP ask to stop instead of ending the program.
+/// From now on Ctrl-C, SIGTERM and SIGHUP ask to stop instead of ending the program. But one that was ignored when the
+/// program was started stays ignored: `nohup` is there for that, and a shell has its background jobs ignore Ctrl-C.
 ///
 /// # Errors
 /// Where the system does not allow it.
-pub fn listen() -> Result<Stop, ctrlc::Error> {
+pub fn listen() -> std::io::Result<Stop> {
     let stop = Stop::default();
     let asked = stop.clone();
-    ctrlc::set_handler(move || asked.ask())?;
+    let ignored = ignored();
+    let heard = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|s| *s == SIGTERM || !is_in(ignored, *s));
+    let mut signals = Signals::new(heard)?;
+    std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        // Ends with the program.
+        signals.forever().for_each(|_| asked.ask());
+    })?;
     Ok(stop)
+}
+
+/// The signals that this process ignores, a bit each; none where the system does not tell.
+fn ignored() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    status.lines().find_map(mask).unwrap_or(0)
+}
+
+fn mask(line: &str) -> Option<u64> {
+    u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok()
+}
+
+fn is_in(mask: u64, signal: i32) -> bool {
+    mask >> (signal - 1) & 1 == 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ignored_signals_are_read_from_their_mask() {
+        let of_nohup = mask("SigIgn:\t0000000000001001").expect("a mask");
+        assert!(is_in(of_nohup, SIGHUP) && !is_in(of_nohup, SIGINT) && !is_in(of_nohup, SIGTERM));
+        assert!(mask("SigCgt:\t0000000000001001").is_none() && mask("SigIgn:\tnone").is_none());
+    }
 }

@@ -49,6 +49,9 @@ pub struct Status {
     pub unsettled: usize,
     /// What has ended since it began.
     pub ended: Counts,
+    /// Log messages that were lost, because nobody took them off standard error.
+    #[serde(default)]
+    pub log_lines_lost: usize,
 }
 
 /// An input on its way.

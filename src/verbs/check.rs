@@ -8,6 +8,7 @@
 use super::{Exit, complain, say, shown};
 use crate::formats::gmsh;
 use crate::formats::vtu::{self, Grid};
+use crate::ledger;
 use crate::outcome::{Reason, Status};
 use crate::report::{self, ChartReport, Report, certificate, chart_checksum};
 use crate::settings::HandOff;
@@ -145,10 +146,10 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
         if Path::new(&output.file).file_name() != Some(output.file.as_ref()) {
             return Some(file(&output.file, "is no plain file name"));
         }
-        match read(folder, &output.file) {
-            Ok(bytes) if report::Output::of(&output.file, &bytes) == *output => None,
-            Ok(_) => Some(file(&output.file, "its content is not what was published (size or blake3 differs)")),
-            Err(finding) => Some(finding),
+        match ledger::holds(folder, output) {
+            Ok(true) => None,
+            Ok(false) => Some(file(&output.file, "its content is not what was published (size or blake3 differs)")),
+            Err(error) => Some(file(&output.file, format!("cannot read the file: {error}"))),
         }
     });
     missing.chain(damaged).collect()

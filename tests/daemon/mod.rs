@@ -83,6 +83,12 @@ impl Watched {
         self.daemon = Some(command.spawn().expect("starts"));
     }
 
+    /// Starts the daemon in another way.
+    pub fn start_as(&mut self, command: &mut Command) {
+        assert!(self.daemon.is_none(), "one at a time");
+        self.daemon = Some(command.spawn().expect("starts"));
+    }
+
     pub fn pid(&self) -> u32 {
         self.daemon.as_ref().expect("it runs").id()
     }

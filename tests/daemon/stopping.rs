@@ -104,3 +104,33 @@ fn an_output_folder_that_is_removed_ends_the_daemon() {
     assert_eq!(w.wait().code(), Some(2));
     assert!(w.log().contains("the output folder was removed"), "{}", w.log());
 }
+
+/// As under `nohup`: what was ignored when the daemon was started stays ignored.
+#[test]
+fn a_hangup_that_is_ignored_at_the_start_ends_nothing() {
+    let mut w = Watched::new(&[]);
+    let real = env!("CARGO_BIN_EXE_planish");
+    let script = format!("trap '' HUP; exec {real} watch {} --out {}", w.inbox().display(), w.out.path().display());
+    w.start_as(std::process::Command::new("sh").args(["-c", &script]));
+    w.wait_until("it tells", |w| w.status()["pid"] == w.pid());
+    w.signal(Signal::HUP);
+    let bytes = disk(3, 0.0);
+    w.drop_in("a.stl", &bytes);
+    w.wait_for(&[("a.stl", &bytes)]);
+    w.stop();
+    w.assert_complete("a.stl", Status::Certified);
+}
+
+#[test]
+fn a_reader_of_the_log_that_stands_still_holds_up_neither_work_nor_end() {
+    let mut w = Watched::new(&["-vvv"]);
+    let inputs: Vec<(String, Vec<u8>)> = (0..300).map(|i| (format!("{i}.stl"), disk(2, f64::from(i)))).collect();
+    inputs.iter().for_each(|(name, bytes)| w.drop_in(name, bytes));
+    // A pipe that nobody reads is full after some hundred lines.
+    w.start_with(|command| command.stderr(std::process::Stdio::piped()));
+    w.wait_for(&inputs.iter().map(|(name, bytes)| (name.as_str(), &bytes[..])).collect::<Vec<_>>());
+    let since = Instant::now();
+    w.signal(Signal::TERM);
+    assert_eq!(w.wait().code(), Some(0));
+    assert!(since.elapsed() < Duration::from_secs(8), "{:?}", since.elapsed());
+}
