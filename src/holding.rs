@@ -1,9 +1,9 @@
 //! Hidden folders in which files of an inbox are held while they are looked at for the last time.
 //!
 //! Whoever may drop files into an inbox may also rename, remove and make folders there. So a holding folder is used
-//! through a handle, whatever becomes of its name, and only where nobody but this user can look or reach into it. At the
-//! next start only such folders are taken for ones that a killed program has left ([`recover`]): what others made under
-//! such a name is left alone, never read, and told.
+//! through a handle, whatever becomes of its name, and only where nobody but this user can look or reach into it. At
+//! the next start only such folders are taken for ones that a killed program has left ([`recover`]): what others made
+//! under such a name is left alone, never read, and told.
 //!
 //! Deliberately absent: any copy. What is held goes in and comes back by a rename, so nothing of it is opened, be it a
 //! link, a pipe or a device.
@@ -32,8 +32,8 @@ const ATTEMPTS: u32 = 100;
 /// Why inputs cannot be taken out of an inbox.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "inputs cannot be put away, as nothing can be taken out of the inbox {}: {error}; let the user that planish runs as \
-     write to this folder, or leave inputs where they are (`--inputs keep`)", shown(.inbox)
+    "inputs cannot be put away, as nothing can be taken out of the inbox {}: {error}; let the user that planish runs \
+     as write to this folder, or leave inputs where they are (`--inputs keep`)", shown(.inbox)
 )]
 pub struct InboxError {
     /// The inbox.
@@ -210,8 +210,8 @@ pub fn recover(inbox: &Path, recursive: bool) {
     for_all_left(inbox, recursive, restore);
 }
 
-/// Clears what was being copied to `destination`, and if asked to its sub-folders, when the program was killed. What was
-/// held there, as in an inbox, is given back; what is not ours is left alone, and told.
+/// Clears what was being copied to `destination`, and if asked to its sub-folders, when the program was killed. What
+/// was held there, as in an inbox, is given back; what is not ours is left alone, and told.
 pub fn clear(destination: &Path, recursive: bool) {
     for_all_left(destination, recursive, |folder, name| {
         if is_file(folder, name)? { remove_copy(folder, name) } else { restore(folder, name) }

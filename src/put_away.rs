@@ -5,21 +5,22 @@
 //! name at the same moment, or somebody writes to it without a trace (through shared memory, neither size nor time
 //! change). What is not is given back. Nothing is followed on the way, and what was kept goes again where it fails.
 //!
-//! Guarantee: an input that is removed has the content that was processed, and where it is to be moved, a file with this
-//! content is at its new place. Not covered: what somebody writes through shared memory after that last reading.
+//! Guarantee: an input that is removed has the content that was processed, and where it is to be moved, a file with
+//! this content is at its new place. Not covered: what somebody writes through shared memory after that last reading.
 
 use crate::holding::{HOLDING, Holding};
 use crate::look::Look;
 use crate::regular::{self, OpenError};
 use crate::shown::shown;
 use blake3::{Hash, Hasher};
-use rustix::fd::AsFd;
+use rustix::fd::{AsFd, BorrowedFd};
 use rustix::fs::{AtFlags, CWD, linkat};
 use rustix::io::Errno;
+use rustix::process::geteuid;
 use std::ffi::OsStr;
 use std::fs::{self, File, Permissions};
 use std::io::{self, ErrorKind, Read, Seek, Write};
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 /// Numbers that are tried to find a free name.
@@ -114,7 +115,7 @@ fn try_to_put_away(input: &Processed, way: Way) -> io::Result<Fate> {
 
 /// The file in its inbox, opened.
 struct Source<'a> {
-    folder: rustix::fd::BorrowedFd<'a>,
+    folder: BorrowedFd<'a>,
     name: &'a OsStr,
     file: File,
 }
@@ -195,17 +196,20 @@ fn keep_at(input: &Processed, source: &Source, place: &Path) -> io::Result<Optio
         let place = if number == 1 { place.to_owned() } else { numbered(place, number) };
         let is_it = match put_in_free_place(input, source, &place, folder) {
             Err(e) if e.kind() == ErrorKind::AlreadyExists => {
-                if has_content(input, &place)? {
+                if has_content(input, source, &place)? {
                     return Ok(Some(Kept::Found));
                 }
                 continue;
             }
             ended => ended?,
         };
+        if !is_it {
+            return Ok(None);
+        }
         // The original is removed next.
-        let synced = File::open(folder).and_then(|folder| folder.sync_all()).map(|()| is_it);
-        let is_it = if is_it { kept_or_removed(&place, synced)? } else { false };
-        return Ok(is_it.then_some(Kept::Made(place)));
+        let synced = File::open(folder).and_then(|folder| folder.sync_all());
+        kept_or_removed(&place, synced.map(|()| true))?;
+        return Ok(Some(Kept::Made(place)));
     }
     Err(io::Error::new(ErrorKind::AlreadyExists, format!("{} and {MOST_COPIES} numbered names exist", shown(place))))
 }
@@ -235,10 +239,8 @@ fn copy_to_free_place(input: &Processed, from: &File, place: &Path, folder: &Pat
     let kept = kept.persist_noclobber(place).map_err(|e| e.error)?;
     // Under the name that it had until now, it is known by these (see `holding::clear`).
     let mode = metadata.permissions().mode() & PERMISSIONS;
-    kept_or_removed(
-        place,
-        kept.set_permissions(Permissions::from_mode(mode)).and_then(|()| kept.sync_all()).map(|()| true),
-    )
+    let set = kept.set_permissions(Permissions::from_mode(mode)).and_then(|()| kept.sync_all());
+    kept_or_removed(place, set.map(|()| true))
 }
 
 /// Removes what was just put at `place`, unless all is well with it.
@@ -250,10 +252,12 @@ fn kept_or_removed(place: &Path, is_well: io::Result<bool>) -> io::Result<bool> 
 }
 
 /// Whether a regular file with the content of the input is at `place`, perhaps from an earlier attempt; then it is on
-/// disk.
-fn has_content(input: &Processed, place: &Path) -> io::Result<bool> {
+/// disk. One of another user does not count, who could change it later.
+fn has_content(input: &Processed, source: &Source, place: &Path) -> io::Result<bool> {
     let Ok(file) = regular::open_itself(place) else { return Ok(false) };
-    if file.metadata()?.len() != input.look.bytes || copy(&file, input, &mut io::sink())? != input.hash {
+    let (found, owner) = (file.metadata()?, source.file.metadata()?.uid());
+    let is_alike = found.len() == input.look.bytes && [owner, geteuid().as_raw()].contains(&found.uid());
+    if !is_alike || copy(&file, input, &mut io::sink())? != input.hash {
         return Ok(false);
     }
     file.sync_all().map(|()| true)
@@ -401,6 +405,20 @@ mod tests {
         assert_eq!(place.put("a.stl", &seen, "one", way).expect("moved"), Fate::Away);
         assert_eq!(place.all(), ["done/a.2.stl", "done/a.stl"]);
         assert_eq!((place.read("done/a.stl"), place.read("done/a.2.stl")), ("another".into(), "one".into()));
+    }
+
+    #[test]
+    fn an_identical_file_of_another_user_is_not_relied_on() {
+        let place = Place::new();
+        fs::create_dir(place.path("done")).expect("made");
+        place.write("done/a.stl", "one");
+        if std::os::unix::fs::chown(place.path("done/a.stl"), Some(65534), None).is_err() {
+            eprintln!("skipped: only root can give files away");
+            return;
+        }
+        let seen = place.write("a.stl", "one");
+        place.put("a.stl", &seen, "one", Way::To(&place.path("done/a.stl"))).expect("moved");
+        assert_eq!(place.all(), ["done/a.2.stl", "done/a.stl"]);
     }
 
     #[test]

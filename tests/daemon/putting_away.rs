@@ -58,6 +58,29 @@ fn folders_that_others_made_in_the_inbox_are_left_alone_and_told_once() {
     w.stop();
 }
 
+/// Where links to what is not theirs cannot be made, or moved, files must not be copied through them instead.
+#[test]
+fn nothing_is_copied_for_those_who_may_not_read_it() {
+    if !can_be_nobody() {
+        eprintln!("skipped: only root can make files of one user and run the program as another");
+        return;
+    }
+    let mut w = Watched::new(&[]);
+    open_for_nobody(&w);
+    let (secret, evil) = (w.beside("secret"), w.inbox().join(".planish-taken-evil"));
+    fs::write(&secret, "secret").expect("written");
+    set_mode(&secret, 0o600);
+    chown(&secret, Some(NOBODY), Some(NOBODY)).expect("given away");
+    fs::create_dir(&evil).expect("made");
+    symlink(&secret, evil.join("a.txt")).expect("linked");
+    [&evil, &w.inbox()].iter().for_each(|folder| set_mode(folder, 0o777));
+    w.start_with(|command| command.uid(NOBODY).gid(NOBODY));
+    w.wait_until("it watches", starts);
+    assert_eq!(names(&w.inbox()).into_iter().collect::<Vec<_>>(), [".planish-taken-evil"]);
+    assert_eq!(fs::read_link(evil.join("a.txt")).expect("a link"), secret);
+    w.stop();
+}
+
 #[test]
 fn what_a_kill_left_behind_is_given_back_or_cleared_at_the_next_start() {
     let done = tempfile::tempdir().expect("a folder");
@@ -155,11 +178,14 @@ fn what_is_written_through_shared_memory_is_not_lost_with_the_input() {
         assert_eq!(answer, "written\n");
     };
     write('b');
-    let mut w = Watched::new(&["--inputs", "delete"]);
+    // What waits to be quiet is read again after that; so the command takes as long.
+    let slow = "[[on_certified]]\ncommand = [\"sh\", \"-c\", \"test $(head -c 1 {input}) = c || sleep 11\"]\n";
+    let mut w = Watched::configured(slow, &["--inputs", "delete"]);
     fs::remove_dir(w.inbox()).expect("removed");
     symlink(inbox.path(), w.inbox()).expect("linked");
     w.start();
-    w.wait_for(&[("a.stl", &content(b'b'))]);
+    w.wait_until("the command runs", |w| w.status()["running"][0]["stage"] == "chain");
+    assert!(w.is_done("a.stl", &content(b'b')), "{}", w.log());
     let before = fs::metadata(&path).expect("there");
     write('c');
     let after = fs::metadata(&path).expect("there");
