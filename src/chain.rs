@@ -3,9 +3,10 @@
 use crate::hooks::{self, HookError, Target};
 use crate::job::Job;
 use crate::publish::Publisher;
-use crate::put_away::{PutAwayError, Way, put_away};
+use crate::put_away::{Fate, Processed, PutAwayError, Way, put_away};
 use crate::report::Report;
 use crate::settings::{Inputs, Settings};
+use blake3::Hash;
 use std::time::{Duration, Instant};
 
 /// Why what should follow did not.
@@ -32,6 +33,9 @@ pub enum Followed {
     BrokenOff,
     /// All is done but that the input is put away: it is too early for that.
     Until(Instant),
+    /// All is done but that the input is put away: its content is no longer what was processed, whether that shows or
+    /// not. It is to be processed again.
+    Changed,
 }
 
 /// Whether anything follows.
@@ -60,14 +64,16 @@ pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publishe
     // With files beside it, an input would lose its sense elsewhere; and they may belong to others, too.
     let is_alone = report.input.beside.is_empty();
     if all_succeeded && is_alone && report.refused_components.is_empty() {
-        return Ok(done_with(job, settings)?);
+        return Ok(done_with(job, report, settings)?);
     }
     Ok(Followed::Whole)
 }
 
 /// Puts the input away, as the settings say; inputs of an inbox only.
-fn done_with(job: &Job, settings: &Settings) -> Result<Followed, PutAwayError> {
-    let (Some(seen), Some(since)) = (&job.look, job.since) else { return Ok(Followed::Whole) };
+fn done_with(job: &Job, report: &Report, settings: &Settings) -> Result<Followed, PutAwayError> {
+    let (Some(look), Some(since), Some(inbox)) = (&job.look, job.since, &job.within) else {
+        return Ok(Followed::Whole);
+    };
     let target;
     let way = match &settings.inputs {
         Inputs::Keep => return Ok(Followed::Whole),
@@ -77,8 +83,14 @@ fn done_with(job: &Job, settings: &Settings) -> Result<Followed, PutAwayError> {
             Way::To(&target)
         }
     };
+    // What was certified was read: there is a hash.
+    let hash = report.input.blake3.as_ref().and_then(|hash| Hash::from_hex(hash).ok());
+    let Some(hash) = hash else { return Ok(Followed::Whole) };
     if since.elapsed() < QUIET {
         return Ok(Followed::Until(since + QUIET));
     }
-    put_away(&job.path, seen, way).map(|()| Followed::Whole)
+    Ok(match put_away(&Processed { inbox, name: &job.name, look, hash }, way)? {
+        Fate::Away | Fate::Nothing => Followed::Whole,
+        Fate::Changed => Followed::Changed,
+    })
 }

@@ -433,6 +433,12 @@ fn follow_up(Chained { travel, done }: Chained) {
         Ok(Followed::Whole) => End::Done(done),
         Ok(Followed::BrokenOff) => End::Unwanted,
         Ok(Followed::Until(then)) => End::Later(done, then),
+        Ok(Followed::Changed) => {
+            tracing::info!(
+                "changed since it was read, whether its size and times show it or not: it is processed again"
+            );
+            End::Outdated(done)
+        }
         Err(error) => {
             tracing::error!("{error}");
             End::Unchained(done, error.to_string())

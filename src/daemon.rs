@@ -166,7 +166,7 @@ impl<'a> Daemon<'a> {
     }
 
     fn ended(&mut self, Ended { job, end }: Ended) {
-        if let End::Done(done) | End::Later(done, _) | End::Unchained(done, _) = &end
+        if let End::Done(done) | End::Later(done, _) | End::Outdated(done) | End::Unchained(done, _) = &end
             && !done.up_to_date
         {
             self.status.ended.count(done.report.status);
@@ -189,7 +189,9 @@ impl<'a> Daemon<'a> {
                     tracing::info!(input = shown(&job.name), "waits: {}", reason.message);
                     self.inbox.done(&job.name, &look);
                 }
-                End::Changed => self.inbox.again(&job.name, &look, Instant::now() + Duration::from_secs(1)),
+                End::Changed | End::Outdated(_) => {
+                    self.inbox.again(&job.name, &look, Instant::now() + Duration::from_secs(1));
+                }
                 End::Unwritten(error) if error.is_lasting() => self.inbox.done(&job.name, &look),
                 End::Unwanted | End::Unwritten(_) | End::Unchained(..) | End::Lost => {
                     self.inbox.again(&job.name, &look, Instant::now() + AGAIN);

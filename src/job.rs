@@ -83,6 +83,8 @@ pub enum End {
     Done(Done),
     /// Its result stands, but its input is to be put away, and it is too early for that: not before then.
     Later(Done, Instant),
+    /// Its result stands, but when its input was to be put away, that was something else: it is to be processed again.
+    Outdated(Done),
     /// It was no longer wanted: nothing was published.
     Unwanted,
     /// The file is not what was seen, or gone: nothing was published.

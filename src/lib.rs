@@ -10,6 +10,7 @@ pub mod conveyor;
 pub mod daemon;
 pub mod formats;
 pub mod hand_off;
+pub mod holding;
 pub mod hooks;
 pub mod inbox;
 pub mod inputs;

@@ -7,6 +7,7 @@
 use crate::shown::shown;
 use rustix::fd::{AsFd, OwnedFd};
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, openat, statat};
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
@@ -32,6 +33,18 @@ pub enum OpenError {
         /// How many it may have.
         most: u64,
     },
+}
+
+impl OpenError {
+    /// Whether nothing is there.
+    pub fn is_missing(&self) -> bool {
+        matches!(self, Self::Io(error) if error.kind() == io::ErrorKind::NotFound)
+    }
+
+    /// As an error of the system.
+    pub fn into_io(self) -> io::Error {
+        if let Self::Io(error) = self { error } else { io::Error::other(self.to_string()) }
+    }
 }
 
 /// Nothing waits for another end (pipes), and no terminal takes control.
@@ -68,13 +81,39 @@ pub fn open_inside(folder: &Path, path: &Path) -> Result<File, OpenError> {
 /// # Errors
 /// [`OpenError`].
 pub fn open_below(folder: &Path, name: &Path) -> Result<File, OpenError> {
+    let at = folder_below(folder, name.parent().unwrap_or(Path::new("")))?;
+    open_in(&at, Path::new(name.file_name().ok_or(OpenError::NotRegular)?))
+}
+
+/// Opens the folder `name` below `folder` (or that itself, where `name` is empty), where there is no link on the way
+/// from there on.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn folder_below(folder: &Path, name: &Path) -> Result<OwnedFd, OpenError> {
     let folders = FLAGS | OFlags::DIRECTORY;
     let mut at = openat(CWD, folder, folders, Mode::empty()).map_err(io::Error::from)?;
-    for part in name.parent().into_iter().flat_map(Path::components) {
+    for part in name.components() {
         let Component::Normal(part) = part else { return Err(OpenError::NotRegular) };
         at = openat(&at, part, folders | OFlags::NOFOLLOW, Mode::empty()).map_err(io::Error::from)?;
     }
-    open_at(at, Path::new(name.file_name().ok_or(OpenError::NotRegular)?), true)
+    Ok(at)
+}
+
+/// Opens the folder `name` in an open folder; it is no link.
+///
+/// # Errors
+/// Where it is none, or must not be opened.
+pub fn folder_in(folder: impl AsFd, name: &OsStr) -> io::Result<File> {
+    Ok(File::from(openat(folder, name, FLAGS | OFlags::DIRECTORY | OFlags::NOFOLLOW, Mode::empty())?))
+}
+
+/// Opens the regular file `name` in an open folder; it is no link.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn open_in(folder: impl AsFd, name: impl AsRef<Path>) -> Result<File, OpenError> {
+    open_at(folder, name.as_ref(), true)
 }
 
 fn open_at(folder: impl AsFd, name: &Path, itself: bool) -> Result<File, OpenError> {

@@ -108,7 +108,7 @@ fn table(rows: &[Row]) -> Table {
     for (job, end) in rows {
         let name = shown(&job.name);
         table.add_row(match end {
-            End::Done(done) | End::Later(done, _) | End::Unchained(done, _) => cells(name, done),
+            End::Done(done) | End::Later(done, _) | End::Outdated(done) | End::Unchained(done, _) => cells(name, done),
             End::Unwanted => vec![name, "interrupted".to_owned()],
             End::Changed | End::Waiting(_) | End::Unwritten(_) | End::Lost => vec![name, "not written".to_owned()],
         });
@@ -158,13 +158,13 @@ fn tell_trouble(job: &Job, end: &End) {
             let place = untold.map_or(String::new(), |place| format!(" ({place})"));
             complain(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
         }
-        End::Done(_) | End::Later(..) | End::Unwanted => {}
+        End::Done(_) | End::Later(..) | End::Outdated(_) | End::Unwanted => {}
     }
 }
 
 /// Says on standard error what is doubtful about the surface of an input.
 fn tell_doubts(job: &Job, end: &End) {
-    if let End::Done(done) | End::Later(done, _) | End::Unchained(done, _) = end {
+    if let End::Done(done) | End::Later(done, _) | End::Outdated(done) | End::Unchained(done, _) = end {
         let warnings = done.report.warnings.iter();
         warnings.for_each(|w| complain(&format!("{}: warning: {}", shown(&job.path), w.message)));
     }

@@ -3,9 +3,9 @@
 use super::{Exit, shown};
 use crate::conveyor::Conveyor;
 use crate::daemon::Daemon;
+use crate::holding;
 use crate::places::{self, Place};
 use crate::publish::Publisher;
-use crate::put_away;
 use crate::settings::{Inputs, Settings};
 use crate::signals;
 use crate::status::Lock;
@@ -20,9 +20,15 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
     let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
     std::fs::read_dir(inbox).map_err(|e| format!("cannot watch {}: {e}; make the folder first", shown(inbox)))?;
     places::refuse_nested(&places(inbox, out, settings))?;
+    if settings.inputs != Inputs::Keep {
+        holding::try_out(inbox)?;
+    }
     let publisher = Arc::new(Publisher::open(out)?);
     let lock = Lock::take(out)?;
-    put_away::recover(inbox, settings.recursive);
+    holding::recover(inbox, settings.recursive);
+    if let Inputs::Move(folder) = &settings.inputs {
+        holding::clear(folder, settings.recursive);
+    }
     let stop = signals::listen()?;
     let conveyor = Conveyor::start(settings, publisher.clone()).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = shown(inbox), out = shown(out), "watches");

@@ -4,6 +4,7 @@ mod chaining;
 mod dropping;
 mod killing;
 mod many;
+mod putting_away;
 mod stopping;
 
 use crate::support::Out;
