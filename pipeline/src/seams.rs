@@ -113,11 +113,12 @@ impl Curve {
 }
 
 impl SeamNetwork {
-    /// Finds the curves of `charts`, which are those of an atlas of `mesh`, in order.
-    pub fn new(mesh: &SurfaceMesh, charts: &[Chart]) -> Self {
+    /// Finds the curves of `charts`, which are those of an atlas of `mesh`, in order. Corners at which an edge of the shape
+    /// turns sharply are taken if they are no nearer than `spacing` (in the unit of the input) to others along the curve.
+    pub fn new(mesh: &SurfaceMesh, charts: &[Chart], spacing: f64) -> Self {
         let boundary = Boundary::new(mesh, charts);
         let mut corner = boundary.corners();
-        kinks::mark(mesh, charts, &boundary, &mut corner);
+        kinks::mark(mesh, charts, &boundary, spacing, &mut corner);
         let mut network = Tracer::new(mesh, &boundary, &corner, charts.len()).trace();
         network.neighbours = network.find_neighbours(charts.len());
         network

@@ -2,12 +2,13 @@
 //!
 //! A mesher keeps the points in which curves end, and cuts off all other corners of a curve by chords. So the corners of
 //! the shape must be points. The zigzag of a seam across a smooth surface is none, and neither is that of a boundary that
-//! scanning or marching cubes left: it turns sharply from edge to edge, but not from four edges to the next four.
+//! scanning or marching cubes left: it turns sharply from edge to edge, but not from four edges to the next four. And what
+//! lies nearer together than a mesh can tell apart is one corner at most: more would ask for smaller elements.
 
 use super::Boundary;
 use crate::atlas::Chart;
 use crate::mesh::SurfaceMesh;
-use crate::space::{Vec3, cross, dot, norm, sub};
+use crate::space::{Vec3, cross, distance, dot, norm, sub};
 
 /// An edge is sharp, and a curve turns sharply, from here on: the default of `feature-angle`.
 const SHARP: f64 = 40.0;
@@ -15,16 +16,19 @@ const SHARP: f64 = 40.0;
 /// Over so many edges to both sides a curve must turn sharply. A staircase of three edges and one does not.
 const SCALES: [usize; 3] = [1, 2, 4];
 
-/// Marks the vertices as corners in which edges of the shape turn sharply. `corner` tells the others.
-pub(super) fn mark(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, corner: &mut [bool]) {
+/// Marks the vertices as corners in which edges of the shape turn sharply, the sharpest first, if there is no corner within
+/// `spacing` along the curve yet. `corner` tells the others.
+pub(super) fn mark(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, spacing: f64, corner: &mut [bool]) {
     let chains = Chains::new(mesh, boundary, corner);
     let is_shape: Vec<bool> = (0..boundary.by_segment.len()).map(|s| is_shape(mesh, charts, boundary, s)).collect();
-    let turns = |v: usize| {
-        let segments = chains.segments[v];
-        segments.iter().all(|s| is_shape[*s as usize]) && SCALES.iter().all(|k| chains.turns_sharply(v, *k))
-    };
-    let kinks: Vec<usize> = (0..corner.len()).filter(|v| chains.is_inner(*v) && turns(*v)).collect();
-    kinks.into_iter().for_each(|v| corner[v] = true);
+    let of_shape = |v: &usize| chains.is_inner(*v) && chains.segments[*v].iter().all(|s| is_shape[*s as usize]);
+    let kinks = (0..corner.len()).filter(of_shape).filter_map(|v| Some((chains.turn(v)?, v)));
+    let mut kinks: Vec<(f64, usize)> = kinks.collect();
+    kinks.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let spacing = spacing * mesh.metric().scale;
+    for (_, v) in kinks {
+        corner[v] = chains.segments[v].iter().all(|s| chains.is_free(v, *s, spacing, corner));
+    }
 }
 
 /// Whether a segment is an edge of the shape: open boundary, an edge of several sheets, or a sharp edge between two charts.
@@ -95,15 +99,39 @@ impl Chains {
         at
     }
 
-    /// Whether the curve turns sharply at `v`, by the chords over `steps` edges to both sides; fewer where it is short. A
-    /// loop that is no longer than that tells nothing against it.
-    fn turns_sharply(&self, v: usize, steps: usize) -> bool {
-        let ahead = self.segments[v].map(|s| self.ahead(v, s, steps));
-        if ahead.contains(&v) {
-            return true;
+    /// How the curve turns at `v`, as the largest cosine of the angles between the chords over [`SCALES`] edges to both
+    /// sides; fewer where it is short. None: it does not turn sharply. A loop that is no longer than the edges tells
+    /// nothing against it.
+    fn turn(&self, v: usize) -> Option<f64> {
+        let mut largest = -1.0_f64;
+        for steps in SCALES {
+            let ahead = self.segments[v].map(|s| self.ahead(v, s, steps));
+            if ahead.contains(&v) {
+                continue;
+            }
+            let [before, after] = ahead.map(|v| self.places[v]);
+            let (come, go) = (sub(self.places[v], before), sub(after, self.places[v]));
+            largest = largest.max(dot(come, go) / (norm(come) * norm(go)));
         }
-        let [before, after] = ahead.map(|v| self.places[v]);
-        let (come, go) = (sub(self.places[v], before), sub(after, self.places[v]));
-        dot(come, go) < SHARP.to_radians().cos() * norm(come) * norm(go)
+        // Not where lengths are zero.
+        (largest < SHARP.to_radians().cos()).then_some(largest)
+    }
+
+    /// Whether there is no corner within `spacing` of `v` along the chain that begins with `segment`. Ends: at a corner,
+    /// when the length is reached, or at `v` itself.
+    fn is_free(&self, v: usize, segment: u32, spacing: f64, corner: &[bool]) -> bool {
+        let (mut at, mut segment, mut length) = (v, segment, 0.0);
+        loop {
+            let next = self.ahead(at, segment, 1);
+            length += distance(self.places[at], self.places[next]);
+            if length >= spacing {
+                return true;
+            }
+            if next == v || corner[next] || !self.is_inner(next) {
+                return false;
+            }
+            let [first, second] = self.segments[next];
+            (at, segment) = (next, if first == segment { second } else { first });
+        }
     }
 }

@@ -24,7 +24,7 @@ pub(crate) fn sector(p: Vec3, count: u32) -> u32 {
 
 /// What holds in every network.
 fn verify(mesh: &SurfaceMesh, atlas: &Atlas) -> SeamNetwork {
-    let network = SeamNetwork::new(mesh, atlas.charts());
+    let network = SeamNetwork::new(mesh, atlas.charts(), 0.0);
     let mut seen: Vec<(ChartId, HalfEdgeId)> = Vec::new();
     for (curve, id) in network.curves().iter().zip(0..) {
         assert_eq!((curve.id(), curve.sides()[0].forward), (CurveId(id), true));
@@ -181,7 +181,7 @@ fn a_chart_along_itself_is_seen_on_both_sides() {
 
 /// A flat strip of `n` squares of which the upper boundary is moved by `up`.
 fn strip(n: u32, up: impl Fn(u32) -> f64) -> TriangleSoup {
-    let point = |k: u32| [f64::from(k / 2), if k % 2 == 0 { 0.0 } else { 3.0 + up(k / 2) }, 0.0];
+    let point = |k: u32| [f64::from(k / 2), if k.is_multiple_of(2) { 0.0 } else { 3.0 + up(k / 2) }, 0.0];
     let square = |i: u32| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]];
     TriangleSoup::new((0..=2 * n + 1).map(point).collect(), (0..n).flat_map(square).collect()).expect("sound")
 }
@@ -199,6 +199,9 @@ fn corners_of_the_shape_are_points_and_zigzags_are_not() {
     assert!(corners_of(&strip(20, |i| f64::from(i % 2)), |_| 0) <= 6, "a zigzag");
     assert_eq!(corners_of(&strip(20, |i| if i < 10 { f64::from(i) } else { f64::from(20 - i) }), |_| 0), 5, "a gable");
     assert_eq!(corners_of(&shapes::flat_disk(12), |_| 0), 0, "a circle");
+    let (mesh, atlas) = labelled(&strip(20, |_| 0.0), |_| 0);
+    let corners_apart = |spacing| corners(&SeamNetwork::new(&mesh, atlas.charts(), spacing));
+    assert_eq!([2.9, 3.1, 19.9, 50.0].map(corners_apart), [4, 2, 2, 0], "3 by 20");
 }
 
 #[test]
