@@ -35,8 +35,9 @@ const QUICK: f64 = 4_500.0;
 /// The largest area ratio of such a chart: MeshAdapt cuts off what a map shrinks (gebco_seabed, at 5e4).
 const EVEN: f64 = 100.0;
 
-/// A place is narrow if it is narrower than this share of an edge: elements are as small there.
-const NARROW: f64 = 0.75;
+/// A place is narrow if it is narrower than this share of an edge: elements are as small there. Corners of the shape that are
+/// nearer together are not all kept, as they would make narrow places.
+pub const NARROW: f64 = 0.75;
 
 /// Every loop of a chart gets at least so many edges.
 const EDGES_PER_LOOP: f64 = 8.0;
@@ -72,7 +73,7 @@ pub struct HandedOff {
     pub report: HandOff,
 }
 
-/// Hands charts with their certified maps to Gmsh, for triangles with edges of length `size` (by default
+/// Hands charts with their certified maps to Gmsh, for triangles with edges of length `size` (see
 /// [`default_size`]). `distortions` tells how much each map stretches. Warns where Gmsh would do badly; a hand-off that
 /// fails is told and leaves the maps as they are.
 pub fn gmsh(
@@ -81,9 +82,8 @@ pub fn gmsh(
     maps: &[CertifiedChart],
     distortions: &[Summary],
     network: &SeamNetwork,
-    size: Option<f64>,
+    size: f64,
 ) -> HandedOff {
-    let size = size.unwrap_or_else(|| default_size(mesh));
     let shortest_seam_distance = network.shortest_distance(mesh);
     let mut report = HandOff { size, shortest_seam_distance, ..HandOff::default() };
     report.warning = shortest_seam_distance.filter(|d| size > 0.5 * d).map(|d| too_coarse(size, d));

@@ -279,7 +279,8 @@ pub fn assemble(
     let (mut charts, done): (Vec<Chart>, Vec<CertifiedChart>) = done.into_iter().unzip();
     Atlas::renumber(&mut charts);
     report.decomposition.iter_mut().for_each(|d| d.charts_by_splitting = charts.len() - whole);
-    let network = SeamNetwork::new(mesh, &charts);
+    let size = settings.size.unwrap_or_else(|| hand_off::default_size(mesh));
+    let network = SeamNetwork::new(mesh, &charts, hand_off::NARROW * size);
     let fields: Vec<_> = charts.iter().zip(&done).map(|(c, d)| distortion::fields(c, &d.certified)).collect();
     let mut distortions = Vec::with_capacity(charts.len());
     for ((chart, done), fields) in charts.iter().zip(&done).zip(&fields) {
@@ -291,7 +292,7 @@ pub fn assemble(
     report.seams = report::seams(&network);
     let mut files = encode(mesh, &charts, &done, &fields, &network)?;
     if settings.hand_off == settings::HandOff::Gmsh {
-        let handed = hand_off::gmsh(mesh, &charts, &done, &distortions, &network, settings.size);
+        let handed = hand_off::gmsh(mesh, &charts, &done, &distortions, &network, size);
         files.extend(handed.files);
         report.hand_off = Some(handed.report);
     }

@@ -4,12 +4,15 @@
 //! their own, their edges between the same two welded vertices are one segment. A *curve* is a maximal chain of
 //! segments with the same charts beside them: one (open boundary), two (a seam), or more (sheets that meet). A
 //! *corner* is a vertex in which other than two segments meet, or two with different charts beside them, or two
-//! along which one chart runs twice. A closed chain without a corner is one curve with one point.
+//! along which one chart runs twice, or where an edge of the shape itself (open boundary, sharp seams, sheets that meet)
+//! turns sharply: a mesh keeps its points, and cuts off all other corners. A closed chain without a corner is one curve
+//! with one point.
 //!
 //! Curves are numbered in the order in which the loops of the charts first meet them, and run as the first of these
 //! charts does. The cost is that of sorting the segments.
 
 mod distance;
+mod kinks;
 
 pub(crate) use distance::segment_distance;
 
@@ -53,7 +56,7 @@ pub struct CurveSide {
 pub struct CurvePoint {
     /// A vertex of the surface there.
     pub vertex: VertexId,
-    /// Whether curves meet or change there; if not, it is where one closed curve happens to begin.
+    /// Whether curves meet, change or turn sharply there; if not, it is where one closed curve happens to begin.
     pub corner: bool,
 }
 
@@ -110,10 +113,12 @@ impl Curve {
 }
 
 impl SeamNetwork {
-    /// Finds the curves of `charts`, which are those of an atlas of `mesh`, in order.
-    pub fn new(mesh: &SurfaceMesh, charts: &[Chart]) -> Self {
+    /// Finds the curves of `charts`, which are those of an atlas of `mesh`, in order. Corners at which an edge of the shape
+    /// turns sharply are taken if they are no nearer than `spacing` (in the unit of the input) to others along the curve.
+    pub fn new(mesh: &SurfaceMesh, charts: &[Chart], spacing: f64) -> Self {
         let boundary = Boundary::new(mesh, charts);
-        let corner = boundary.corners();
+        let mut corner = boundary.corners();
+        kinks::mark(mesh, charts, &boundary, spacing, &mut corner);
         let mut network = Tracer::new(mesh, &boundary, &corner, charts.len()).trace();
         network.neighbours = network.find_neighbours(charts.len());
         network

@@ -197,7 +197,7 @@ fn tube(around: u32, length: u32) -> TriangleSoup {
 }
 
 fn seam_length(mesh: &SurfaceMesh, atlas: &Atlas) -> f64 {
-    let network = crate::seams::SeamNetwork::new(mesh, atlas.charts());
+    let network = crate::seams::SeamNetwork::new(mesh, atlas.charts(), 0.0);
     network.seams().map(crate::seams::Curve::length).sum()
 }
 

@@ -147,7 +147,7 @@ mod tests {
     fn bands_of_a_tube_are_as_far_apart_as_their_seams() {
         // Circles in the planes through the axis of the torus: closest where its tube is innermost, at 0.6.
         let (mesh, atlas) = labelled(&shapes::ring_torus(24, 12), |p| sector(p, 4));
-        let network = SeamNetwork::new(&mesh, atlas.charts());
+        let network = SeamNetwork::new(&mesh, atlas.charts(), 0.0);
         let expected = 0.6 * 2.0_f64.sqrt();
         assert!((network.shortest_distance(&mesh).expect("seams") - expected).abs() < 1e-12);
         // Brute force over all pairs of segments agrees.
@@ -166,7 +166,7 @@ mod tests {
     fn one_seam_and_seams_that_meet_have_no_distance() {
         for (soup, count) in [(shapes::sphere(8), 3), (shapes::disk(5), 2), (shapes::disk(5), 1)] {
             let (mesh, atlas) = labelled(&soup, |p| sector(p, count));
-            assert_eq!(SeamNetwork::new(&mesh, atlas.charts()).shortest_distance(&mesh), None);
+            assert_eq!(SeamNetwork::new(&mesh, atlas.charts(), 0.0).shortest_distance(&mesh), None);
         }
     }
 

@@ -24,7 +24,7 @@ pub(crate) fn sector(p: Vec3, count: u32) -> u32 {
 
 /// What holds in every network.
 fn verify(mesh: &SurfaceMesh, atlas: &Atlas) -> SeamNetwork {
-    let network = SeamNetwork::new(mesh, atlas.charts());
+    let network = SeamNetwork::new(mesh, atlas.charts(), 0.0);
     let mut seen: Vec<(ChartId, HalfEdgeId)> = Vec::new();
     for (curve, id) in network.curves().iter().zip(0..) {
         assert_eq!((curve.id(), curve.sides()[0].forward), (CurveId(id), true));
@@ -120,8 +120,9 @@ fn a_torus_of_two_annuli_has_two_closed_seams() {
 fn a_disk_with_holes_has_open_curves_only() {
     let (mesh, atlas) = labelled(&shapes::disk_with_holes(17, 3), |_| 0);
     let network = verify(&mesh, &atlas);
-    assert_eq!((network.curves().len(), network.seams().count()), (4, 0));
-    assert!(network.curves().iter().all(|c| c.is_open() && c.is_closed()));
+    // A square with three square holes.
+    assert_eq!((network.curves().len(), network.seams().count(), corners(&network)), (16, 0, 16));
+    assert!(network.curves().iter().all(|c| c.is_open() && !c.is_closed()));
     assert!(network.neighbours(ChartId(0)).is_empty());
 }
 
@@ -134,7 +135,8 @@ fn pages_of_a_book_share_their_spine() {
     let network = verify(&mesh, &atlas);
     let spine: Vec<&Curve> = network.seams().collect();
     assert_eq!((spine.len(), spine[0].sides().len(), spine[0].segments()), (1, 3, 6));
-    assert_eq!((network.curves().len(), corners(&network)), (4, 2));
+    // Every page has two corners more.
+    assert_eq!((network.curves().len(), corners(&network)), (1 + 3 * 3, 2 + 3 * 2));
     assert_eq!(network.neighbours(ChartId(0)), [ChartId(1), ChartId(2)]);
     let directions: Vec<bool> = spine[0].sides().iter().map(|s| s.forward).collect();
     assert_eq!(directions, [true, false, true], "every second page lies on its other face");
@@ -175,4 +177,52 @@ fn a_chart_along_itself_is_seen_on_both_sides() {
     let along: Vec<_> = network.seams().collect();
     assert_eq!(along.len(), 2, "no chain runs on where a chart passes twice");
     assert!(along.iter().all(|c| c.sides().len() == 3 && c.sides()[0].chart == c.sides()[1].chart));
+}
+
+/// A flat strip of `n` squares of which the upper boundary is moved by `up`.
+fn strip(n: u32, up: impl Fn(u32) -> f64) -> TriangleSoup {
+    let point = |k: u32| [f64::from(k / 2), if k.is_multiple_of(2) { 0.0 } else { 3.0 + up(k / 2) }, 0.0];
+    let square = |i: u32| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]];
+    TriangleSoup::new((0..=2 * n + 1).map(point).collect(), (0..n).flat_map(square).collect()).expect("sound")
+}
+
+fn corners_of(soup: &TriangleSoup, label: impl Fn(Vec3) -> u32) -> usize {
+    let (mesh, atlas) = labelled(soup, label);
+    verify(&mesh, &atlas).points().iter().filter(|p| p.corner).count()
+}
+
+#[test]
+fn corners_of_the_shape_are_points_and_zigzags_are_not() {
+    assert_eq!(corners_of(&strip(20, |_| 0.0), |_| 0), 4, "a rectangle");
+    assert_eq!(corners_of(&strip(1, |_| 0.0), |_| 0), 4, "of two triangles, too");
+    // Beside a corner a zigzag may seem to turn with it.
+    assert!(corners_of(&strip(20, |i| f64::from(i % 2)), |_| 0) <= 6, "a zigzag");
+    assert_eq!(corners_of(&strip(20, |i| if i < 10 { f64::from(i) } else { f64::from(20 - i) }), |_| 0), 5, "a gable");
+    assert_eq!(corners_of(&shapes::flat_disk(12), |_| 0), 0, "a circle");
+    let (mesh, atlas) = labelled(&strip(20, |_| 0.0), |_| 0);
+    let corners_apart = |spacing| corners(&SeamNetwork::new(&mesh, atlas.charts(), spacing));
+    assert_eq!([2.9, 3.1, 19.9, 50.0].map(corners_apart), [4, 2, 2, 0], "3 by 20");
+}
+
+#[test]
+fn corners_of_sharp_seams_are_points_and_those_of_smooth_ones_are_not() {
+    // A square inside a plate, as a chart of its own: in its plane, and lifted out of it, so that its edges are sharp.
+    let plate = |height: f64| {
+        let n = 12_u32;
+        let at = |i: u32, j: u32| j * (n + 1) + i;
+        let point = |k: u32| {
+            let (i, j) = (k % (n + 1), k / (n + 1));
+            let top = (5..=7).contains(&i) && (5..=7).contains(&j);
+            [f64::from(i), f64::from(j), if top { height } else { 0.0 }]
+        };
+        let square = |k: u32| {
+            let (i, j) = (k % n, k / n);
+            [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+        };
+        TriangleSoup::new((0..(n + 1) * (n + 1)).map(point).collect(), (0..n * n).flat_map(square).collect())
+            .expect("sound")
+    };
+    let is_inner = |p: Vec3| u32::from((5.0..7.0).contains(&p[0]) && (5.0..7.0).contains(&p[1]));
+    assert_eq!(corners_of(&plate(0.0), is_inner), 4, "of the plate");
+    assert_eq!(corners_of(&plate(2.0), is_inner), 8, "and of the block upon it");
 }

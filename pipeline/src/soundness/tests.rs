@@ -19,7 +19,7 @@ impl Sample {
         let (mesh, atlas) = labelled(soup, label);
         let maps: Vec<_> =
             atlas.charts().iter().map(|c| finish_chart(map_chart(c, Order::Quadratic).expect("maps"))).collect();
-        let network = SeamNetwork::new(&mesh, atlas.charts());
+        let network = SeamNetwork::new(&mesh, atlas.charts(), 0.0);
         let linear = subdivide(&mesh, atlas.charts(), &maps, &vec![None; maps.len()], &network).expect("subdivides");
         let point = |n: &u32| linear.points()[*n as usize];
         let charts = linear.charts().iter().enumerate().map(|(c, l)| {

@@ -21,7 +21,7 @@ impl Sample {
         let certified = |c| finish_chart(map_chart(c, Order::Quadratic).expect("maps"));
         let maps: Vec<CertifiedChart> = atlas.charts().iter().map(certified).collect();
         let straight = vec![None; maps.len()];
-        let network = SeamNetwork::new(&mesh, atlas.charts());
+        let network = SeamNetwork::new(&mesh, atlas.charts(), 0.0);
         Self { mesh, atlas, maps, straight, network }
     }
 
