@@ -160,6 +160,7 @@ fn kind(defect: &Defect) -> &'static str {
         Defect::Empty { .. } => "empty_chart",
         Defect::NoChart { .. } => "no_chart",
         Defect::Folded { .. } => "folded",
+        Defect::InsideOut { .. } => "inside_out",
         Defect::CurveEnd { .. } => "curve_end",
         Defect::CurveBroken { .. } => "curve_broken",
         Defect::StrayBoundary { .. } => "stray_boundary",

@@ -73,17 +73,25 @@ pub fn check(
         None => in_chart(mesh, &nodes, chart, |v, rim| rim.place(places.get(&v)?, &atlas.curves), distance),
     };
     in_plane.place(&nodes, &uv);
-    let turn = |t: &&u32| {
-        let [a, b, c] = mesh.triangulation.triangles[**t as usize].map(|v| in_plane.at(v));
-        orientation(a, b, c) <= 0
+    let turn = |t: &u32| {
+        let [a, b, c] = mesh.triangulation.triangles[*t as usize].map(|v| in_plane.at(v));
+        orientation(a, b, c)
     };
-    let folded: Vec<u32> = triangles.iter().filter(turn).copied().collect();
-    let centre = |t: u32| super::centroid(mesh.triangulation.corners(t as usize));
+    let is_inside_out = !triangles.is_empty() && triangles.iter().all(|t| turn(t) < 0);
+    let folded: Vec<u32> = triangles.iter().filter(|t| turn(t) <= 0).copied().collect();
     let mut defects = Vec::new();
     if let Some(first) = folded.first() {
-        defects.push(Defect::Folded { chart: id, triangles: folded.len(), at: centre(*first) });
+        let (triangles, at) = (folded.len(), super::centroid(mesh.triangulation.corners(*first as usize)));
+        defects.push(if is_inside_out {
+            Defect::InsideOut { chart: id, triangles, at }
+        } else {
+            Defect::Folded { chart: id, triangles, at }
+        });
     }
-    defects.extend(boundary_defect(mesh, id, &boundaries.open[id.index()], in_plane));
+    let open = &boundaries.open[id.index()];
+    // The loops of a mesh that is turned run the other way round, and may be right otherwise.
+    let turned: Vec<[VertexId; 2]> = if is_inside_out { open.iter().map(|[a, b]| [*b, *a]).collect() } else { vec![] };
+    defects.extend(boundary_defect(mesh, id, if is_inside_out { &turned } else { open }, in_plane));
     defects
 }
 

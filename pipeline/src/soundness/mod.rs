@@ -93,6 +93,20 @@ pub enum Defect {
         /// The first one.
         at: Vec3,
     },
+    /// All triangles of a chart are turned: Gmsh takes the side of one element for that of a whole surface, and where the
+    /// surface bends sharply within an element that may be the wrong one.
+    #[error(
+        "the mesh of chart {chart} is inside out: all its {triangles} triangles are turned; turn them, or mesh with another \
+         size"
+    )]
+    InsideOut {
+        /// The chart.
+        chart: ChartId,
+        /// How many.
+        triangles: usize,
+        /// The first one.
+        at: Vec3,
+    },
     /// Begin or end of a curve is no node.
     #[error("an end of curve {curve} is no node of the mesh")]
     CurveEnd {
@@ -236,6 +250,7 @@ impl Defect {
             Self::Empty { .. } | Self::Topology { .. } | Self::Area { .. } | Self::ChartArea { .. } => None,
             Self::NoChart { at, .. }
             | Self::Folded { at, .. }
+            | Self::InsideOut { at, .. }
             | Self::CurveEnd { at, .. }
             | Self::CurveBroken { at, .. }
             | Self::StrayBoundary { at, .. }

@@ -141,6 +141,25 @@ fn a_node_beyond_its_neighbours_folds_the_mesh_although_it_lies_on_the_surface()
 }
 
 #[test]
+fn a_chart_that_is_turned_inside_out_is_told_as_one_defect() {
+    let sample = Sample::sphere();
+    let turned = |which: fn(usize) -> bool| {
+        sample.defects(|mesh| {
+            let charts = mesh.charts.clone().expect("by charts");
+            let of_first = charts.iter().enumerate().filter(|(_, c)| **c == charts[0]).map(|(t, _)| t);
+            for (_, t) in of_first.enumerate().filter(|(k, _)| which(*k)) {
+                mesh.triangulation.triangles[t].swap(1, 2);
+            }
+        })
+    };
+    let whole = turned(|_| true);
+    assert!(whole.iter().any(|d| matches!(d, Defect::InsideOut { .. })), "{whole:?}");
+    assert!(!whole.iter().any(|d| matches!(d, Defect::Folded { .. } | Defect::BoundaryNested { .. })), "{whole:?}");
+    let all_but_one = turned(|k| k > 0);
+    assert!(all_but_one.iter().any(|d| matches!(d, Defect::Folded { .. })), "{all_but_one:?}");
+}
+
+#[test]
 fn a_node_off_the_surface_is_found() {
     let sample = Sample::sphere();
     let (v, _) = sample.inner_vertex(1);
