@@ -31,6 +31,9 @@ pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Folder) -> Option<Repo
 /// Why it cannot be read.
 pub fn holds(folder: &Path, output: &Output) -> Result<bool, OpenError> {
     let file = regular::open(&folder.join(&output.file))?;
+    if file.metadata()?.len() != output.bytes {
+        return Ok(false);
+    }
     match regular::read(&file, output.bytes) {
         Ok(content) => Ok(Output::of(&output.file, &content) == *output),
         Err(OpenError::TooLarge { .. }) => Ok(false),

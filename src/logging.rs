@@ -1,14 +1,21 @@
 //! Log messages, on standard error.
 
 use crate::settings::{Log, Settings};
+use std::fs::File;
 use std::io::IsTerminal;
+use std::os::fd::AsFd;
 use std::sync::OnceLock;
+use std::sync::mpsc;
+use std::time::Duration;
 use tracing::level_filters::LevelFilter;
 use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::fmt::writer::BoxMakeWriter;
 
 /// So many messages of a daemon wait for standard error at most: a megabyte or two.
 const WAITING: usize = 10_000;
+
+/// How long what still waits may take to be written at the end.
+const LAST_WORDS: Duration = Duration::from_secs(2);
 
 /// Counts what was lost.
 static LOST: OnceLock<ErrorCounter> = OnceLock::new();
@@ -22,9 +29,9 @@ pub fn lost() -> usize {
 /// there.
 ///
 /// What a daemon says never holds up what it does: a reader of standard error that stands still costs messages, which are
-/// counted ([`lost`]). What still waits is written when the returned guard goes, within a second.
+/// counted ([`lost`]). What still waits is written when [`LastWords`] go.
 #[must_use]
-pub fn start(settings: &Settings, is_daemon: bool) -> Option<WorkerGuard> {
+pub fn start(settings: &Settings, is_daemon: bool) -> LastWords {
     let level = match (settings.quiet, settings.verbose.saturating_add(u8::from(is_daemon))) {
         (true, _) => LevelFilter::ERROR,
         // What is refused is told by the summary already.
@@ -45,13 +52,36 @@ pub fn start(settings: &Settings, is_daemon: bool) -> Option<WorkerGuard> {
     std::panic::set_hook(Box::new(|panic| {
         tracing::debug!(place = %panic.location().map(ToString::to_string).unwrap_or_default(), "panic: {panic}");
     }));
-    guard
+    LastWords(guard)
+}
+
+/// Writes what still waits when it goes, if somebody takes it within two seconds.
+pub struct LastWords(Option<WorkerGuard>);
+
+impl Drop for LastWords {
+    fn drop(&mut self) {
+        let Some(guard) = self.0.take() else { return };
+        // It waits, and complains on standard output, where nobody takes messages: not here.
+        let (written, wait) = mpsc::channel();
+        let flushed = std::thread::Builder::new().name("last words".to_owned()).spawn(move || {
+            drop(guard);
+            let _ = written.send(());
+        });
+        if flushed.is_ok() {
+            let _ = wait.recv_timeout(LAST_WORDS);
+        }
+    }
 }
 
 /// A writer that hands messages to a thread, or counts them as lost.
 fn aside() -> (BoxMakeWriter, Option<WorkerGuard>) {
     let builder = NonBlockingBuilder::default().lossy(true).buffered_lines_limit(WAITING).thread_name("log");
-    let (writer, guard) = builder.finish(std::io::stderr());
+    // A handle of its own: who complains on standard error at the end does not wait for the lock of a writer that stands.
+    let own = std::io::stderr().as_fd().try_clone_to_owned().map(File::from);
+    let (writer, guard) = match own {
+        Ok(file) => builder.finish(file),
+        Err(_) => builder.finish(std::io::stderr()),
+    };
     let _ = LOST.set(writer.error_counter());
     (BoxMakeWriter::new(writer), Some(guard))
 }

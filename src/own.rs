@@ -15,8 +15,9 @@ use std::time::{Duration, Instant};
 /// Others may neither read nor write.
 const PRIVATE: Mode = Mode::RUSR.union(Mode::WUSR);
 
-/// How long a lock is waited for. Whoever holds one does so for milliseconds, but a disk may be slow.
-pub const PATIENCE: Duration = Duration::from_secs(10);
+/// How long a lock is waited for. Whoever holds one does so for milliseconds mostly; but disks may be slow, and what
+/// people put into a result may have to be copied.
+pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The longest pause between two looks at a lock.
 const PAUSE: Duration = Duration::from_millis(50);

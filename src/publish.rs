@@ -151,9 +151,17 @@ impl Publisher {
         let folder = self.folder_for(name)?;
         let own = replace::own_files(&target).unwrap_or_default();
         keep_foreign(&target, &own, &fresh, false)?;
+        sync_folder(&fresh).map_err(at(&fresh))?;
         if let Some(older) = put_in_place(&fresh, &target, parent.path()).map_err(at(&target))? {
-            // Nothing is lost of what was put there in this moment, either.
-            keep_foreign(&older, &own, &target, true)?;
+            // Nothing is lost of what was put there in this moment, either: where it cannot be kept, the older comes back.
+            let late = match fs::symlink_metadata(&older) {
+                Ok(m) if !m.is_dir() => Err(PublishError::Foreign(target.clone())),
+                _ => keep_foreign(&older, &own, &target, true),
+            };
+            if let Err(error) = late {
+                put_back(&older, &target, parent.path()).map_err(at(&older))?;
+                return Err(error);
+            }
         }
         sync_folder(&folder).map_err(at(&folder)).map(|()| true)
     }
@@ -211,7 +219,7 @@ fn may_be_replaced(target: &Path) -> bool {
 
 /// What lies in the folder `older`, if that is there, and is not planish's own, gets a place in `fresh`, too.
 fn keep_foreign(older: &Path, own: &BTreeSet<OsString>, fresh: &Path, again: bool) -> Result<(), PublishError> {
-    if !older.is_dir() {
+    if !fs::symlink_metadata(older).is_ok_and(|m| m.is_dir()) {
         return Ok(());
     }
     let kept = replace::keep_foreign(older, own, fresh, again).map_err(|e| match e {
@@ -277,7 +285,21 @@ fn put_in_place_in_two_steps(fresh: &Path, target: &Path, staging: &Path) -> io:
         Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
         moved => moved.is_ok(),
     };
-    fs::rename(fresh, target).map(|()| moved.then_some(older))
+    match fs::rename(fresh, target) {
+        Ok(()) => Ok(moved.then_some(older)),
+        Err(error) => {
+            if moved {
+                fs::rename(&older, target)?;
+            }
+            Err(error)
+        }
+    }
+}
+
+/// The older result comes back to its place; the newer one goes with the staging folder.
+fn put_back(older: &Path, target: &Path, staging: &Path) -> io::Result<()> {
+    fs::rename(target, staging.join("withdrawn"))?;
+    fs::rename(older, target)
 }
 
 /// Removes staging folders that are ours and whose lock nobody holds, and those that were made and never locked, which
@@ -356,6 +378,21 @@ mod tests {
             put_in_place_in_two_steps(&fresh, &target, &staging).expect("placed");
             assert_eq!(fs::read_to_string(target.join("a.txt")).expect("there"), text);
         }
+    }
+
+    #[test]
+    fn an_older_result_comes_back_where_the_newer_one_cannot_stay() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [fresh, target, staging] = ["fresh", "target", "staging"].map(|n| folder.path().join(n));
+        [&target, &staging].iter().for_each(|path| fs::create_dir(path).expect("made"));
+        fs::write(target.join("a.txt"), "old").expect("written");
+        let is_old = || fs::read_to_string(target.join("a.txt")).is_ok_and(|text| text == "old");
+        assert!(put_in_place_in_two_steps(&fresh, &target, &staging).is_err() && is_old(), "there is no newer one");
+        fs::create_dir(&fresh).expect("made");
+        let older = put_in_place(&fresh, &target, &staging).expect("placed").expect("one was there");
+        assert!(!is_old());
+        put_back(&older, &target, &staging).expect("put back");
+        assert!(is_old());
     }
 
     #[test]

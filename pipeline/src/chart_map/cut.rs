@@ -112,7 +112,7 @@ impl Cutter<'_> {
                 Err(error) => decompose::split(self.mesh, &part, error.log_scales(), self.settings, self.host)?,
             };
             // A single triangle that has no map is left to the caller's rule for charts that do not map.
-            let Some(parts) = parts else { return Ok(None) };
+            let Some(parts) = parts.filter(|p| p.len() > 1) else { return Ok(None) };
             waiting.extend(parts);
         }
         Ok(Some((done, naturals)))

@@ -26,8 +26,16 @@ pub(super) fn mark(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, sp
     let mut kinks: Vec<(f64, usize)> = kinks.collect();
     kinks.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let spacing = spacing * mesh.metric().scale;
+    // Loops that are shorter than the spacing are walked once.
+    let mut is_short = vec![false; corner.len()];
     for (_, v) in kinks {
+        if is_short[v] {
+            continue;
+        }
         corner[v] = chains.segments[v].iter().all(|s| chains.is_free(v, *s, spacing, corner));
+        if !corner[v] {
+            chains.mark_loop(v, spacing, corner, &mut is_short);
+        }
     }
 }
 
@@ -111,10 +119,33 @@ impl Chains {
             }
             let [before, after] = ahead.map(|v| self.places[v]);
             let (come, go) = (sub(self.places[v], before), sub(after, self.places[v]));
-            largest = largest.max(dot(come, go) / (norm(come) * norm(go)));
+            let lengths = norm(come) * norm(go);
+            if lengths.is_nan() || lengths <= 0.0 {
+                return None;
+            }
+            largest = largest.max(dot(come, go) / lengths);
         }
-        // Not where lengths are zero.
         (largest < SHARP.to_radians().cos()).then_some(largest)
+    }
+
+    /// Marks all of a loop without corners that is shorter than `spacing`, if `v` lies on one. Ends as [`Self::is_free`] does.
+    fn mark_loop(&self, v: usize, spacing: f64, corner: &[bool], is_short: &mut [bool]) {
+        let (mut at, mut segment, mut length) = (v, self.segments[v][0], 0.0);
+        let mut passed = vec![v];
+        loop {
+            let next = self.ahead(at, segment, 1);
+            length += distance(self.places[at], self.places[next]);
+            if length >= spacing || corner[next] || !self.is_inner(next) {
+                return;
+            }
+            if next == v {
+                break;
+            }
+            passed.push(next);
+            let [first, second] = self.segments[next];
+            (at, segment) = (next, if first == segment { second } else { first });
+        }
+        passed.into_iter().for_each(|v| is_short[v] = true);
     }
 
     /// Whether there is no corner within `spacing` of `v` along the chain that begins with `segment`. Ends: at a corner,
