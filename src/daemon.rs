@@ -166,9 +166,7 @@ impl<'a> Daemon<'a> {
     }
 
     fn ended(&mut self, Ended { job, end }: Ended) {
-        if let End::Done(done) | End::Later(done, _) | End::Outdated(done) | End::Unchained(done, _) = &end
-            && !done.up_to_date
-        {
+        if let Some(done) = end.standing().filter(|done| !done.up_to_date) {
             self.status.ended.count(done.report.status);
         } else if matches!(end, End::Lost) {
             tracing::error!(

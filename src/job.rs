@@ -99,6 +99,16 @@ pub enum End {
     Unchained(Done, String),
 }
 
+impl End {
+    /// The result that stands, whatever became of what should follow it.
+    pub fn standing(&self) -> Option<&Done> {
+        match self {
+            Self::Done(done) | Self::Later(done, _) | Self::Outdated(done) | Self::Unchained(done, _) => Some(done),
+            Self::Unwanted | Self::Changed | Self::Waiting(_) | Self::Unwritten(_) | Self::Lost => None,
+        }
+    }
+}
+
 /// What became of a job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Done {

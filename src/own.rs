@@ -5,6 +5,7 @@
 //! only what is a real folder or a regular file is taken for ours. And whoever may read a file may lock it: lock files
 //! are readable by their owner only, and nobody waits for a lock for ever.
 
+use crate::regular;
 use rustix::fs::{CWD, FileType, Mode, OFlags, fchmod, fstat, openat};
 use rustix::io::Errno;
 use std::fs::{self, File, TryLockError};
@@ -15,7 +16,7 @@ use std::time::{Duration, Instant};
 /// Others may neither read nor write.
 const PRIVATE: Mode = Mode::RUSR.union(Mode::WUSR);
 
-/// How long a lock is waited for. Whoever holds one does so for milliseconds mostly; but disks may be slow, and what
+/// How long the lock of an output folder is waited for. Whoever holds one does so for milliseconds mostly; but disks may be slow, and what
 /// people put into a result may have to be copied.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -27,23 +28,16 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// # Errors
 /// The system refuses, or something else is there: a link, too.
 pub fn folder(path: &Path) -> io::Result<()> {
-    match fs::symlink_metadata(path) {
-        Ok(there) if there.is_dir() => Ok(()),
-        Ok(_) => Err(io::Error::other("it is no folder, or a link to one; remove it, or use another output folder")),
-        Err(e) if e.kind() == ErrorKind::NotFound => {
-            fs::create_dir_all(path.parent().unwrap_or(path))?;
-            match fs::create_dir(path) {
-                // Another process was faster: it is looked at as any other.
-                Err(e) if e.kind() == ErrorKind::AlreadyExists => folder_is_real(path),
-                made => made,
-            }
+    fs::create_dir_all(path.parent().unwrap_or(path))?;
+    match fs::create_dir(path) {
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => {
+            let is_real = fs::symlink_metadata(path)?.is_dir();
+            let other =
+                || io::Error::other("it is no folder, or a link to one; remove it, or use another output folder");
+            is_real.then_some(()).ok_or_else(other)
         }
-        Err(e) => Err(e),
+        made => made,
     }
-}
-
-fn folder_is_real(path: &Path) -> io::Result<()> {
-    if fs::symlink_metadata(path)?.is_dir() { Ok(()) } else { Err(ErrorKind::NotADirectory.into()) }
 }
 
 /// Opens the lock file `name` in `folder`; makes it where it is missing. Nothing in it changes, and only its owner may
@@ -64,10 +58,10 @@ pub fn lock_file_there(folder: &Path, name: &str) -> io::Result<File> {
 }
 
 fn open_lock(folder: &Path, name: &str, more: OFlags) -> io::Result<File> {
-    let common = OFlags::CLOEXEC | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::NOCTTY;
-    let folder = openat(CWD, folder, common | OFlags::DIRECTORY, Mode::empty())?;
+    let folder = regular::folder_in(CWD, folder.as_os_str())?;
     // To read and to write: so a pipe opens at once, and is told from a file then.
-    let file = openat(&folder, name, common | OFlags::RDWR | more, PRIVATE).map_err(|e| match e {
+    let flags = regular::FLAGS | OFlags::NOFOLLOW | OFlags::RDWR | more;
+    let file = openat(&folder, name, flags, PRIVATE).map_err(|e| match e {
         Errno::LOOP => io::Error::other("it is a link, which is not followed; remove it"),
         e => e.into(),
     })?;
@@ -82,16 +76,12 @@ fn open_lock(folder: &Path, name: &str, more: OFlags) -> io::Result<File> {
     Ok(File::from(file))
 }
 
-/// Locks a file within [`PATIENCE`], as long as that is `wanted`; whether it is locked. That it takes long is told once,
-/// with the name of the file. Ends: the time runs out.
+/// Locks a file with this path if that is possible within `patience`, and as long as it is `wanted`; whether it is locked.
+/// That it takes long is told once. Ends: the time runs out.
 ///
 /// # Errors
 /// The system refuses.
-pub fn lock(file: &File, path: &Path, wanted: impl Fn() -> bool) -> io::Result<bool> {
-    lock_within(file, path, PATIENCE, wanted)
-}
-
-fn lock_within(file: &File, path: &Path, patience: Duration, wanted: impl Fn() -> bool) -> io::Result<bool> {
+pub fn lock(file: &File, path: &Path, patience: Duration, wanted: impl Fn() -> bool) -> io::Result<bool> {
     let began = Instant::now();
     let (mut pause, mut is_told) = (Duration::from_millis(1), false);
     loop {
@@ -150,11 +140,11 @@ mod tests {
     fn waiting_for_a_lock_ends() {
         let folder = tempfile::tempdir().expect("a folder");
         let [held, other] = [(); 2].map(|()| lock_file(folder.path(), "lock").expect("opens"));
-        assert!(lock(&held, folder.path(), || true).expect("free"));
+        assert!(lock(&held, folder.path(), PATIENCE, || true).expect("free"));
         let patience = Duration::from_millis(30);
-        assert!(!lock_within(&other, folder.path(), patience, || true).expect("in vain"));
-        assert!(!lock(&other, folder.path(), || false).expect("nobody waits"));
+        assert!(!lock(&other, folder.path(), patience, || true).expect("in vain"));
+        assert!(!lock(&other, folder.path(), PATIENCE, || false).expect("nobody waits"));
         drop(held);
-        assert!(lock(&other, folder.path(), || true).expect("free again"));
+        assert!(lock(&other, folder.path(), PATIENCE, || true).expect("free again"));
     }
 }

@@ -1,9 +1,9 @@
 //! Publishing: files are complete in the output folder, or not there.
 //!
 //! The files of an input are written to a staging folder (`OUT/.planish/...`), brought to disk, and renamed into
-//! place in one step; an older result stays until then, and what is not planish's in it moves on ([`crate::replace`]). Each process has a staging folder of its own, held by a
-//! lock; folders whose process is gone are cleared at the next start. What is published is the ledger of what was done:
-//! see [`crate::ledger`].
+//! place in one step; an older result stays until then, and what is not planish's in it moves on ([`crate::replace`]).
+//! Each process has a staging folder of its own, held by a lock; folders whose process is gone are cleared at the next
+//! start. What is published is the ledger of what was done: see [`crate::ledger`].
 
 use crate::own;
 use crate::replace::{self, NotKept};
@@ -147,11 +147,11 @@ impl Publisher {
             return Ok(false);
         }
         // Writing took its time: somebody may have put something there.
-        self.admits(name)?;
+        let own = self.admits(name)?;
         let folder = self.folder_for(name)?;
-        let own = replace::own_files(&target).unwrap_or_default();
-        keep_foreign(&target, &own, &fresh, false)?;
-        sync_folder(&fresh).map_err(at(&fresh))?;
+        if keep_foreign(&target, &own, &fresh, false)? > 0 {
+            sync_folder(&fresh).map_err(at(&fresh))?;
+        }
         if let Some(older) = put_in_place(&fresh, &target, parent.path()).map_err(at(&target))? {
             // Nothing is lost of what was put there in this moment, either: where it cannot be kept, the older comes back.
             let late = match fs::symlink_metadata(&older) {
@@ -166,17 +166,18 @@ impl Publisher {
         sync_folder(&folder).map_err(at(&folder)).map(|()| true)
     }
 
-    /// Whether a result may be put in the place of `name`.
+    /// Whether a result may be put in the place of `name`; and the names of what planish itself has written there.
     ///
     /// # Errors
     /// [`PublishError`]: what stands there.
-    pub fn admits(&self, name: &Path) -> Result<(), PublishError> {
+    pub fn admits(&self, name: &Path) -> Result<BTreeSet<OsString>, PublishError> {
         let target = self.target(name);
         let parents = name.ancestors().skip(1).filter(|p| !p.as_os_str().is_empty()).map(|p| self.out.join(p));
         if let Some(result) = parents.into_iter().find(|p| replace::own_files(p).is_some()) {
             return Err(PublishError::Nested(result));
         }
-        if is_plain(name) && may_be_replaced(&target) { Ok(()) } else { Err(PublishError::Foreign(target)) }
+        let own = if is_plain(name) { replaceable(&target) } else { None };
+        own.ok_or(PublishError::Foreign(target))
     }
 
     /// Nothing is put in place any more, and the staging folder goes. Whoever still writes to it hears of an error.
@@ -208,19 +209,23 @@ fn is_plain(name: &Path) -> bool {
     name.components().all(|part| matches!(part, Component::Normal(_))) && name.file_name().is_some()
 }
 
-/// Whether nothing is there, or an older result (a folder with a report of planish), or an empty folder.
-fn may_be_replaced(target: &Path) -> bool {
+/// The names of what planish has written to `target`: none of them where nothing is there, or an empty folder. None where
+/// it is neither that nor an older result (a folder with a report of planish).
+fn replaceable(target: &Path) -> Option<BTreeSet<OsString>> {
+    let nothing = Some(BTreeSet::new());
     match fs::symlink_metadata(target) {
-        Err(e) => e.kind() == io::ErrorKind::NotFound,
-        Ok(m) if !m.is_dir() => false,
-        Ok(_) => replace::own_files(target).is_some() || fs::read_dir(target).is_ok_and(|mut d| d.next().is_none()),
+        Err(e) => nothing.filter(|_| e.kind() == io::ErrorKind::NotFound),
+        Ok(m) if !m.is_dir() => None,
+        Ok(_) => replace::own_files(target)
+            .or_else(|| nothing.filter(|_| fs::read_dir(target).is_ok_and(|mut d| d.next().is_none()))),
     }
 }
 
-/// What lies in the folder `older`, if that is there, and is not planish's own, gets a place in `fresh`, too.
-fn keep_foreign(older: &Path, own: &BTreeSet<OsString>, fresh: &Path, again: bool) -> Result<(), PublishError> {
+/// What lies in the folder `older`, if that is there, and is not planish's own, gets a place in `fresh`, too; how much
+/// that is.
+fn keep_foreign(older: &Path, own: &BTreeSet<OsString>, fresh: &Path, again: bool) -> Result<usize, PublishError> {
     if !fs::symlink_metadata(older).is_ok_and(|m| m.is_dir()) {
-        return Ok(());
+        return Ok(0);
     }
     let kept = replace::keep_foreign(older, own, fresh, again).map_err(|e| match e {
         NotKept::Stands(path) => PublishError::Stands(path),
@@ -229,7 +234,7 @@ fn keep_foreign(older: &Path, own: &BTreeSet<OsString>, fresh: &Path, again: boo
     if kept > 0 {
         tracing::info!(result = shown(fresh), kept, "files that planish did not write stay in the result");
     }
-    Ok(())
+    Ok(kept)
 }
 
 /// Opens and locks the gate of an output folder, as long as that is `wanted`; none where another process holds it for
@@ -238,7 +243,7 @@ fn pass_gate(out: &Path, wanted: impl Fn() -> bool) -> Result<Option<File>, Publ
     let folder = out.join(STAGING);
     let path = folder.join(GATE);
     let gate = own::lock_file(&folder, GATE).map_err(at(&path))?;
-    Ok(own::lock(&gate, &path, wanted).map_err(at(&path))?.then_some(gate))
+    Ok(own::lock(&gate, &path, own::PATIENCE, wanted).map_err(at(&path))?.then_some(gate))
 }
 
 fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -252,8 +257,8 @@ fn sync_folder(path: &Path) -> io::Result<()> {
 }
 
 /// Renames `fresh` to `target` in one step. Where there is an older result the two change places, and the older one
-/// goes with the staging folder; where that lies now. Another process may put one there, or take it away, at any moment: then the other
-/// way is tried, a few times.
+/// goes with the staging folder; where that lies now. Another process may put one there, or take it away, at any
+/// moment: then the other way is tried, a few times.
 #[cfg(target_os = "linux")]
 fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<Option<PathBuf>> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};

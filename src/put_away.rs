@@ -18,9 +18,9 @@ use rustix::fs::{AtFlags, CWD, linkat};
 use rustix::io::Errno;
 use rustix::process::geteuid;
 use std::ffi::OsStr;
-use std::fs::{self, File, Permissions};
+use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Seek, Write};
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// Numbers that are tried to find a free name.
@@ -28,9 +28,6 @@ const MOST_COPIES: u32 = 10_000;
 
 /// Stems longer than this (bytes) are cut where a number is added; a character has at most four.
 const LONGEST_STEM: usize = 200;
-
-/// What of a file's permissions a copy gets: to run as its owner is not among it, as a copy belongs to somebody else.
-const PERMISSIONS: u32 = 0o777;
 
 /// An input, as it was processed.
 #[derive(Clone, Copy, Debug)]
@@ -238,8 +235,7 @@ fn copy_to_free_place(input: &Processed, from: &File, place: &Path, folder: &Pat
     kept.as_file().sync_all()?;
     let kept = kept.persist_noclobber(place).map_err(|e| e.error)?;
     // Under the name that it had until now, it is known by these (see `holding::clear`).
-    let mode = metadata.permissions().mode() & PERMISSIONS;
-    let set = kept.set_permissions(Permissions::from_mode(mode)).and_then(|()| kept.sync_all());
+    let set = kept.set_permissions(regular::permissions_of_copy(&metadata)).and_then(|()| kept.sync_all());
     kept_or_removed(place, set.map(|()| true))
 }
 
@@ -280,7 +276,8 @@ fn numbered(place: &Path, number: u32) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::fs::symlink;
+    use std::fs::Permissions;
+    use std::os::unix::fs::{PermissionsExt, symlink};
     use walkdir::WalkDir;
 
     struct Place {

@@ -8,8 +8,9 @@ use crate::shown::shown;
 use rustix::fd::{AsFd, OwnedFd};
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, openat, statat};
 use std::ffi::OsStr;
-use std::fs::File;
+use std::fs::{File, Metadata, Permissions};
 use std::io::{self, Read};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
@@ -48,7 +49,7 @@ impl OpenError {
 }
 
 /// Nothing waits for another end (pipes), and no terminal takes control.
-const FLAGS: OFlags = OFlags::CLOEXEC.union(OFlags::NONBLOCK).union(OFlags::NOCTTY);
+pub(crate) const FLAGS: OFlags = OFlags::CLOEXEC.union(OFlags::NONBLOCK).union(OFlags::NOCTTY);
 
 /// Opens the regular file that a path leads to.
 ///
@@ -91,11 +92,10 @@ pub fn open_below(folder: &Path, name: &Path) -> Result<File, OpenError> {
 /// # Errors
 /// [`OpenError`].
 pub fn folder_below(folder: &Path, name: &Path) -> Result<OwnedFd, OpenError> {
-    let folders = FLAGS | OFlags::DIRECTORY;
-    let mut at = openat(CWD, folder, folders, Mode::empty()).map_err(io::Error::from)?;
+    let mut at = openat(CWD, folder, FLAGS | OFlags::DIRECTORY, Mode::empty()).map_err(io::Error::from)?;
     for part in name.components() {
         let Component::Normal(part) = part else { return Err(OpenError::NotRegular) };
-        at = openat(&at, part, folders | OFlags::NOFOLLOW, Mode::empty()).map_err(io::Error::from)?;
+        at = folder_in(&at, part)?.into();
     }
     Ok(at)
 }
@@ -137,6 +137,12 @@ fn patiently(open: impl Fn() -> rustix::io::Result<OwnedFd>) -> io::Result<Owned
         }
     }
     Ok(open()?)
+}
+
+/// What a copy of a file or folder gets of its permissions: to run as its owner is not among it, as a copy belongs to
+/// somebody else.
+pub fn permissions_of_copy(original: &Metadata) -> Permissions {
+    Permissions::from_mode(original.permissions().mode() & 0o777)
 }
 
 /// The bytes of a file, `most` of them at most; whatever is added meanwhile.

@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
 use std::io::{self, ErrorKind};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
@@ -96,15 +96,9 @@ fn is_second(from: &Path, to: &Path) -> bool {
 
 /// Gives a folder the permissions of the one that it was made after, and brings it to disk.
 fn complete(from: &Path, to: &Path) -> io::Result<()> {
-    let mode = fs::symlink_metadata(from)?.permissions().mode();
     let folder = regular::folder_in(CWD, to.as_os_str())?;
-    folder.set_permissions(plain(mode))?;
+    folder.set_permissions(regular::permissions_of_copy(&fs::symlink_metadata(from)?))?;
     folder.sync_all()
-}
-
-/// Read, write and search: a copy gets no other powers of its original, as it belongs to another user.
-fn plain(mode: u32) -> fs::Permissions {
-    fs::Permissions::from_mode(mode & 0o777)
 }
 
 fn second_name(from: &Path, to: &Path) -> io::Result<()> {
@@ -115,7 +109,7 @@ fn second_name(from: &Path, to: &Path) -> io::Result<()> {
             let mut copy = fs::File::options().write(true).create_new(true).mode(0o600).open(to)?;
             io::copy(&mut file, &mut copy)?;
             copy.set_modified(metadata.modified()?)?;
-            copy.set_permissions(plain(metadata.permissions().mode()))?;
+            copy.set_permissions(regular::permissions_of_copy(&metadata))?;
             copy.sync_all()
         }
         linked => linked,
@@ -126,6 +120,7 @@ fn second_name(from: &Path, to: &Path) -> io::Result<()> {
 mod tests {
     use super::*;
     use rustix::fs::{FileType, Mode, mknodat};
+    use std::os::unix::fs::PermissionsExt;
 
     #[test]
     fn a_result_is_known_by_its_report_and_nothing_else() {

@@ -22,6 +22,9 @@ const LOCK_FILE: &str = "watch.lock";
 /// The file that tells what the daemon does.
 const STATUS: &str = "status.json";
 
+/// Who asks whether a daemon runs holds its lock for a moment: so long it is waited for.
+const ASKED: Duration = Duration::from_millis(100);
+
 /// A longer status is none: it names a hundred inputs, and what runs.
 const LONGEST: u64 = 64 << 20;
 
@@ -157,12 +160,10 @@ impl Lock {
         let path = out.join(STAGING).join(LOCK_FILE);
         let failed = |error| LockError::Io { path: path.clone(), error };
         let lock = own::lock_file(&out.join(STAGING), LOCK_FILE).map_err(failed)?;
-        match try_lock(&lock) {
-            Ok(()) => Ok(Self { status: out.join(STAGING).join(STATUS), lock }),
-            Err(TryLockError::WouldBlock) => {
-                Err(LockError::Busy { out: out.to_owned(), pid: told(out).map(|status| status.pid) })
-            }
-            Err(TryLockError::Error(error)) => Err(failed(error)),
+        match own::lock(&lock, &path, ASKED, || true) {
+            Ok(true) => Ok(Self { status: out.join(STAGING).join(STATUS), lock }),
+            Ok(false) => Err(LockError::Busy { out: out.to_owned(), pid: told(out).map(|status| status.pid) }),
+            Err(error) => Err(failed(error)),
         }
     }
 
@@ -189,17 +190,6 @@ impl Drop for Lock {
         // It may never have been written.
         let _ = fs::remove_file(&self.status);
     }
-}
-
-/// Tries a few times: who asks whether a daemon runs holds the lock for a moment.
-fn try_lock(lock: &File) -> Result<(), TryLockError> {
-    for _ in 0..5 {
-        match lock.try_lock() {
-            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(20)),
-            ended => return ended,
-        }
-    }
-    lock.try_lock()
 }
 
 /// What the last daemon told; none: it ended in order, or there never was one.

@@ -15,7 +15,7 @@ use crate::mesh::SurfaceMesh;
 use crate::quadratic::{QuadraticMap, least_det, quadratic_map};
 use crate::sparse;
 use crate::untangle::{self, Untangled, untangle};
-use cut::Cutter;
+use cut::{Attempt, Cutter};
 
 /// The order of the finite elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -39,9 +39,9 @@ pub struct MappedChart {
 }
 
 impl MappedChart {
-    /// The conformal distortion that 99 % of the area does not exceed: for charts with holes in the harmonic map, where there is
-    /// one (untangling changes it little, and takes long where it is large), for others in the raised linear map. Noise makes
-    /// many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
+    /// The conformal distortion that 99 % of the area does not exceed: for charts with holes in the harmonic map, where
+    /// there is one (untangling changes it little, and takes long where it is large), for others in the raised linear
+    /// map. Noise makes many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
     fn conformal_p99(&self, chart: &Chart) -> f64 {
         let nodes = match &self.harmonic {
             Some(Ok(map)) if !chart.holes().is_empty() => map.nodes(),
@@ -161,9 +161,9 @@ pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64, host: &dyn H
 /// right within a decade mostly, and saves untangling; what decides is the certified map.
 const HOPELESS: f64 = 10.0;
 
-/// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, would be more distorted
-/// than `settings` allow, or where neither the disk nor the plane suits it but its parts, until every part is right. Ends
-/// because parts are smaller, and single triangles map.
+/// Maps `chart`, a part of `mesh`, and splits it where it touches itself in space, cannot be mapped, would be more
+/// distorted than `settings` allow, or where neither the disk nor the plane suits it but its parts, until every part is
+/// right. Ends because parts are smaller, and single triangles map.
 ///
 /// # Errors
 /// [`SplitError`].
@@ -178,25 +178,17 @@ pub fn map_or_split(
     let mut mapped = Vec::new();
     let mut waiting = vec![chart];
     while let Some(chart) = waiting.pop() {
-        if let Some(ends) = decompose::contact(mesh, &chart) {
-            waiting.extend(decompose::separate(mesh, &chart, ends, settings, host)?.into_iter().rev());
-            continue;
-        }
-        let error = match map_within(&chart, order, settings.max_area_ratio, host) {
-            Ok(map) => {
-                match cutter.parts(&chart, &map)? {
-                    Some(parts) => mapped.extend(parts),
-                    None => mapped.push((chart, map)),
-                }
-                continue;
+        match cutter.attempt(&chart)? {
+            Attempt::Mapped(map) => match cutter.parts(&chart, &map)? {
+                Some(parts) => mapped.extend(parts),
+                None => mapped.push((chart, *map)),
+            },
+            Attempt::Split(parts) => waiting.extend(parts.into_iter().rev()),
+            // Its map is what it is.
+            Attempt::Single => {
+                let map = map_within(&chart, order, f64::INFINITY, host)?;
+                mapped.push((chart, map));
             }
-            Err(MapError::Cancelled) => return Err(SplitError::Cancelled),
-            Err(error) => error,
-        };
-        match decompose::split(mesh, &chart, error.log_scales(), settings, host)? {
-            Some(parts) => waiting.extend(parts.into_iter().rev()),
-            // A single triangle: its map is what it is.
-            None => mapped.push((chart.clone(), map_within(&chart, order, f64::INFINITY, host)?)),
         }
     }
     Ok(mapped)
@@ -329,21 +321,6 @@ mod tests {
     use crate::mesh::TriangleSoup;
     use crate::{repair, shapes};
 
-    /// An open tube of radius 1 and height `height` with `n` facets around, in `rows` rows.
-    fn tube(n: u32, rows: u32, height: f64) -> TriangleSoup {
-        let at = |row: u32, i: u32| row * n + i % n;
-        let point = |k: u32| {
-            let angle = std::f64::consts::TAU * f64::from(k % n) / f64::from(n);
-            [angle.cos(), angle.sin(), height * f64::from(k / n) / f64::from(rows)]
-        };
-        let points = (0..n * (rows + 1)).map(point).collect();
-        let quads = (0..rows).flat_map(|row| (0..n).map(move |i| (row, i)));
-        let halves = |(row, i): (u32, u32)| {
-            [[at(row, i), at(row, i + 1), at(row + 1, i + 1)], [at(row, i), at(row + 1, i + 1), at(row + 1, i)]]
-        };
-        TriangleSoup::new(points, quads.flat_map(halves).collect()).expect("sound")
-    }
-
     fn parts(soup: &TriangleSoup) -> (SurfaceMesh, Vec<Chart>) {
         let mesh = repair(soup, &Default::default()).expect("repairs").mesh;
         let whole = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").into_charts();
@@ -355,14 +332,14 @@ mod tests {
 
     #[test]
     fn a_tube_of_long_facets_becomes_strips_that_unroll_and_a_fine_one_stays_whole() {
-        let (mesh, strips) = parts(&tube(36, 1, 200.0));
+        let (mesh, strips) = parts(&shapes::tube(36, 1, 200.0));
         assert!(strips.len() >= 2, "{}", strips.len());
         for strip in &strips {
             assert!(strip.holes().is_empty());
             let natural = crate::natural::natural(&mesh, strip, f64::MAX, &Alone).expect("it unrolls");
             assert!(natural.distortion.conformal_p99 < 4.0, "{:?}", natural.distortion);
         }
-        let (_, whole) = parts(&tube(36, 6, 3.0));
+        let (_, whole) = parts(&shapes::tube(36, 6, 3.0));
         assert_eq!(whole.len(), 1, "nothing stretches there");
     }
 

@@ -97,22 +97,24 @@ pub(crate) fn singular_ratio(first: [f64; 2], second: [f64; 2], det: f64) -> f64
 /// Sums up the fields of a chart. Triangles whose shape mollification changed by more than 1 % are left out of the
 /// conformal quantiles (unless all are).
 pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summary {
-    let all_flagged = chart.flagged().iter().all(|f| *f);
-    let counted = |f: &usize| all_flagged || !chart.flagged()[*f];
-    let weighted = |f: usize| (fields[f].conformal_distortion, chart.shapes()[f].area());
-    let mut conformal: Vec<_> = (0..fields.len()).filter(counted).map(weighted).collect();
-    let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
+    let [conformal_median, conformal_p99] = conformal_quantiles(chart, |f| fields[f].conformal_distortion, [0.5, 0.99]);
     Summary { conformal_median, conformal_p99, area_ratio: area_ratio(chart, map) }
 }
 
-/// The conformal distortion that 99 % of the area does not exceed, of a map that may be invalid here and there, by the nodes of
-/// each triangle of the chart: invalid triangles count as stretched without bound.
+/// The conformal distortion that 99 % of the area does not exceed, of a map that may be invalid here and there, by the
+/// nodes of each triangle of the chart: invalid triangles count as stretched without bound.
 pub(crate) fn conformal_p99_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [GridPoint; 6]) -> f64 {
+    let [p99] = conformal_quantiles(chart, |f| conformal_distortion(chart, f, nodes(f).map(|n| n.uv())), [0.99]);
+    p99
+}
+
+/// Quantiles of what `distortion` tells of each triangle of a chart, by area, without those whose shape mollification
+/// changed.
+fn conformal_quantiles<const N: usize>(chart: &Chart, distortion: impl Fn(usize) -> f64, shares: [f64; N]) -> [f64; N] {
     let all_flagged = chart.flagged().iter().all(|f| *f);
     let counted = (0..chart.triangles().len()).filter(|f| all_flagged || !chart.flagged()[*f]);
-    let weighted = |f: usize| (conformal_distortion(chart, f, nodes(f).map(|n| n.uv())), chart.shapes()[f].area());
-    let [p99] = quantiles(&mut counted.map(weighted).collect::<Vec<_>>(), [0.99]);
-    p99
+    let mut weighted: Vec<_> = counted.map(|f| (distortion(f), chart.shapes()[f].area())).collect();
+    quantiles(&mut weighted, shares)
 }
 
 /// Per vertex, the area scale of its star of two rings, with the area of its own star as weight; `plane` are the areas

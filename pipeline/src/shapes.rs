@@ -49,6 +49,20 @@ pub fn flat_disk(rings: u32) -> TriangleSoup {
     soup(points.iter().map(|[x, y]| [*x, *y, 0.0]).collect(), triangles)
 }
 
+/// A tube of radius 1, open at both ends: `around` facets, in `rows` rows over its `height`.
+pub fn tube(around: u32, rows: u32, height: f64) -> TriangleSoup {
+    let point = |k: u32| {
+        let (sin, cos) = (std::f64::consts::TAU * f64::from(k % around) / f64::from(around)).sin_cos();
+        [cos, sin, height * f64::from(k / around) / f64::from(rows)]
+    };
+    let quad = |k: u32| {
+        let (row, a, b) = (k / around * around, k % around, (k + 1) % around);
+        let [a, b, c, d] = [row + a, row + b, row + around + b, row + around + a];
+        [[a, b, c], [a, c, d]]
+    };
+    soup((0..around * (rows + 1)).map(point).collect(), (0..around * rows).flat_map(quad).collect())
+}
+
 /// A disk that is strongly bent out of the plane over irregular points: z = 2.5 sin(3x+1) cos(4y) + 0.75 sin 9x
 /// sin 7y, times `height`. Its harmonic P2 map has many invalid triangles. `jitter` (0 to 0.5) moves points inside
 /// by that share of the ring distance.
@@ -292,6 +306,7 @@ mod tests {
         };
         check(disk(4), 1, 1, Some(0), true);
         check(flat_disk(3), 1, 1, Some(0), true);
+        check(tube(5, 2, 1.0), 1, 2, Some(0), true);
         check(bent_disk(10, 0.3, 1.0), 1, 1, Some(0), true);
         check(disk_with_holes(17, 3), 1, 4, Some(0), true);
         check(floater_five(), 1, 1, Some(0), true);

@@ -107,10 +107,10 @@ fn table(rows: &[Row]) -> Table {
     }
     for (job, end) in rows {
         let name = shown(&job.name);
-        table.add_row(match end {
-            End::Done(done) | End::Later(done, _) | End::Outdated(done) | End::Unchained(done, _) => cells(name, done),
-            End::Unwanted => vec![name, "interrupted".to_owned()],
-            End::Changed | End::Waiting(_) | End::Unwritten(_) | End::Lost => vec![name, "not written".to_owned()],
+        table.add_row(match (end.standing(), end) {
+            (Some(done), _) => cells(name, done),
+            (None, End::Unwanted) => vec![name, "interrupted".to_owned()],
+            (None, _) => vec![name, "not written".to_owned()],
         });
     }
     table
@@ -164,7 +164,7 @@ fn tell_trouble(job: &Job, end: &End) {
 
 /// Says on standard error what is doubtful about the surface of an input.
 fn tell_doubts(job: &Job, end: &End) {
-    if let End::Done(done) | End::Later(done, _) | End::Outdated(done) | End::Unchained(done, _) = end {
+    if let Some(done) = end.standing() {
         let warnings = done.report.warnings.iter();
         warnings.for_each(|w| complain(&format!("{}: warning: {}", shown(&job.path), w.message)));
     }

@@ -48,6 +48,16 @@ pub(super) struct Cutter<'a> {
     pub(super) host: &'a dyn Host,
 }
 
+/// What comes of an attempt to map a chart.
+pub(super) enum Attempt {
+    /// Its map.
+    Mapped(Box<MappedChart>),
+    /// Its parts: it cannot be mapped as a whole.
+    Split(Vec<Chart>),
+    /// Neither: it is a single triangle.
+    Single,
+}
+
 /// By which map a mesher can follow a chart.
 #[derive(Clone, Copy, PartialEq)]
 enum Suits {
@@ -64,7 +74,7 @@ impl Cutter<'_> {
     pub(super) fn parts(&self, chart: &Chart, map: &MappedChart) -> Result<Option<Vec<Mapped>>, SplitError> {
         let on_disk = map.conformal_p99(chart);
         // Only a chart that the disk does not suit is asked for a natural map.
-        if on_disk <= STRETCHED || self.suits(chart, map, STRETCHED) == Suits::Natural {
+        if on_disk <= STRETCHED || self.suits(chart, on_disk, STRETCHED) == Suits::Natural {
             return Ok(None);
         }
         let most = chart.holes().len().max(1) * if on_disk > TORN { MANY } else { FEW };
@@ -93,33 +103,50 @@ impl Cutter<'_> {
             if done.len() + waiting.len() + 1 > most {
                 return Ok(None);
             }
-            if let Some(ends) = decompose::contact(self.mesh, &part) {
-                waiting.extend(decompose::separate(self.mesh, &part, ends, self.settings, self.host)?);
-                continue;
-            }
-            let parts = match map_within(&part, self.order, self.settings.max_area_ratio, self.host) {
-                Ok(map) => {
-                    let suits = self.suits(&part, &map, bound);
-                    let parts = if suits == Suits::Neither { self.halves(&part, &map)? } else { None };
-                    if parts.is_none() {
-                        naturals += usize::from(suits == Suits::Natural);
-                        done.push((part, map));
-                        continue;
-                    }
-                    parts
+            let map = match self.attempt(&part)? {
+                Attempt::Mapped(map) => map,
+                Attempt::Split(parts) => {
+                    waiting.extend(parts);
+                    continue;
                 }
-                Err(MapError::Cancelled) => return Err(SplitError::Cancelled),
-                Err(error) => decompose::split(self.mesh, &part, error.log_scales(), self.settings, self.host)?,
+                // Left to the caller's rule for charts that do not map.
+                Attempt::Single => return Ok(None),
             };
-            // A single triangle that has no map is left to the caller's rule for charts that do not map.
-            let Some(parts) = parts.filter(|p| p.len() > 1) else { return Ok(None) };
-            waiting.extend(parts);
+            let suits = self.suits(&part, map.conformal_p99(&part), bound);
+            let parts = if suits == Suits::Neither { self.halves(&part, &map)? } else { None };
+            match parts {
+                // Nothing becomes smaller.
+                Some(parts) if parts.len() < 2 => return Ok(None),
+                Some(parts) => waiting.extend(parts),
+                None => {
+                    naturals += usize::from(suits == Suits::Natural);
+                    done.push((part, *map));
+                }
+            }
         }
         Ok(Some((done, naturals)))
     }
 
-    fn suits(&self, chart: &Chart, map: &MappedChart, bound: f64) -> Suits {
-        let on_disk = map.conformal_p99(chart);
+    /// Maps a chart, or splits it once where it touches itself in space, cannot be mapped, or would be too distorted.
+    ///
+    /// # Errors
+    /// [`SplitError`].
+    pub(super) fn attempt(&self, chart: &Chart) -> Result<Attempt, SplitError> {
+        let &Self { mesh, order, settings, host } = self;
+        if let Some(ends) = decompose::contact(mesh, chart) {
+            return Ok(Attempt::Split(decompose::separate(mesh, chart, ends, settings, host)?));
+        }
+        let error = match map_within(chart, order, settings.max_area_ratio, host) {
+            Ok(map) => return Ok(Attempt::Mapped(Box::new(map))),
+            Err(MapError::Cancelled) => return Err(SplitError::Cancelled),
+            Err(error) => error,
+        };
+        let parts = decompose::split(mesh, chart, error.log_scales(), settings, host)?;
+        Ok(parts.map_or(Attempt::Single, Attempt::Split))
+    }
+
+    /// `on_disk` is how much the map of the chart stretches.
+    fn suits(&self, chart: &Chart, on_disk: f64, bound: f64) -> Suits {
         let natural = natural::natural(self.mesh, chart, on_disk, self.host);
         if natural.is_some_and(|n| n.distortion.conformal_p99 <= bound) {
             Suits::Natural

@@ -60,15 +60,12 @@ pub fn separate(
     settings: &Settings,
     host: &dyn Host,
 ) -> Result<Vec<Chart>, Error> {
-    let cut = |dual: &Dual, limits: &Limits| {
-        let nearer = Cells { of: nearer_end(dual, ends), count: 2 };
-        bisect_until(dual, nearer, |groups| legal(dual, &Complex::new(dual, groups), limits)).of
-    };
+    let cut = |dual: &Dual, limits: &Limits| bisected(dual, Cells { of: nearer_end(dual, ends), count: 2 }, limits);
     pieces(mesh, chart, cut, settings, host)
 }
 
-/// Cuts `chart`, a part of `mesh`, into at least two charts with the same id, between the triangles on one side and those on
-/// the other; `is_left` tells the side of each. Of each side the largest connected part keeps it.
+/// Cuts `chart`, a part of `mesh`, into at least two charts with the same id, between the triangles on one side and
+/// those on the other; `is_left` tells the side of each. Of each side the largest connected part keeps it.
 ///
 /// # Errors
 /// As [`split`].
@@ -79,23 +76,15 @@ pub fn halve(
     settings: &Settings,
     host: &dyn Host,
 ) -> Result<Vec<Chart>, Error> {
-    let cut = |dual: &Dual, limits: &Limits| {
-        let sides = Cells { of: largest_parts(dual, is_left), count: 2 };
-        bisect_until(dual, sides, |groups| legal(dual, &Complex::new(dual, groups), limits)).of
-    };
+    let cut =
+        |dual: &Dual, limits: &Limits| bisected(dual, Cells { of: largest_parts(dual, is_left), count: 2 }, limits);
     pieces(mesh, chart, cut, settings, host)
 }
 
 /// Per triangle 0 or 1, the side of the largest connected part of one side that is the fewest triangles away.
 fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
     let count = is_left.len();
-    let mut parts = UnionFind::new(count);
-    for h in (0..count).flat_map(|f| [0, 1, 2].map(|k| HalfEdgeId::side_of(FaceId::at(f), k))) {
-        let beside = dual.across(h).map(|t| t.face().index());
-        if let Some(other) = beside.filter(|other| is_left[*other] == is_left[h.face().index()]) {
-            parts.unite(h.face().index(), other);
-        }
-    }
+    let mut parts = joined(dual, |f, g| is_left[f] == is_left[g]);
     let roots: Vec<usize> = (0..count).map(|f| parts.find(f)).collect();
     let mut sizes = vec![0; count];
     roots.iter().for_each(|r| sizes[*r] += 1);
@@ -180,7 +169,12 @@ fn grow(dual: &Dual, mut labels: Vec<u32>, mut front: Vec<FaceId>) -> Vec<u32> {
 
 /// Two parts of about the same size; more where these are no charts.
 fn halves(dual: &Dual, limits: &Limits) -> Vec<u32> {
-    bisect_until(dual, farthest_first(dual, |_| 2), |groups| legal(dual, &Complex::new(dual, groups), limits)).of
+    bisected(dual, farthest_first(dual, |_| 2), limits)
+}
+
+/// The labels of cells that are bisected until all are charts.
+fn bisected(dual: &Dual, cells: Cells, limits: &Limits) -> Vec<u32> {
+    bisect_until(dual, cells, |groups| legal(dual, &Complex::new(dual, groups), limits)).of
 }
 
 /// Per cell, whether it may be a chart. A safe point: all may be where nobody waits for charts any more.
@@ -230,13 +224,19 @@ fn below(dual: &Dual, log_scale: &[f64], level: f64) -> Option<Vec<u32>> {
 
 /// The triangles among those that `admit` tells which are connected to `seed`.
 fn connected(dual: &Dual, seed: usize, admit: impl Fn(usize) -> bool) -> Vec<bool> {
-    let n = dual.mesh.triangles().len();
-    let mut sets = UnionFind::new(n);
-    for h in dual.half_edges().filter(|h| admit(h.face().index())) {
-        if let Some(t) = dual.across(h).filter(|t| admit(t.face().index())) {
-            sets.unite(h.face().index(), t.face().index());
+    let mut sets = joined(dual, |f, g| admit(f) && admit(g));
+    let root = sets.find(seed);
+    (0..dual.mesh.triangles().len()).map(|f| admit(FaceId::at(f).index()) && sets.find(f) == root).collect()
+}
+
+/// The triangles, united with those neighbours with which they are `together`.
+fn joined(dual: &Dual, together: impl Fn(usize, usize) -> bool) -> UnionFind {
+    let mut sets = UnionFind::new(dual.mesh.triangles().len());
+    for h in dual.half_edges() {
+        let beyond = dual.across(h).map(|t| t.face().index());
+        if let Some(other) = beyond.filter(|other| together(h.face().index(), *other)) {
+            sets.unite(h.face().index(), other);
         }
     }
-    let root = sets.find(seed);
-    (0..n).map(|f| admit(FaceId::at(f).index()) && sets.find(f) == root).collect()
+    sets
 }

@@ -182,18 +182,7 @@ fn illegal_charts_are_named() {
 
 /// A tube, open at both ends, `length` times as long as wide.
 fn tube(around: u32, length: u32) -> TriangleSoup {
-    let rings = around * length / 3;
-    let corner = |k: u32| {
-        let (sin, cos) = (std::f64::consts::TAU * f64::from(k % around) / f64::from(around)).sin_cos();
-        [cos, sin, 2.0 * f64::from(length) * f64::from(k / around) / f64::from(rings)]
-    };
-    let quad = |k: u32| {
-        let (row, a, b) = (k / around * around, k % around, (k + 1) % around);
-        let [a, b, c, d] = [row + a, row + b, row + around + b, row + around + a];
-        [[a, b, c], [a, c, d]]
-    };
-    let points = (0..around * (rings + 1)).map(corner).collect();
-    TriangleSoup::new(points, (0..around * rings).flat_map(quad).collect()).expect("sound")
+    shapes::tube(around, around * length / 3, 2.0 * f64::from(length))
 }
 
 fn seam_length(mesh: &SurfaceMesh, atlas: &Atlas) -> f64 {

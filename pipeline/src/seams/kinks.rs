@@ -32,10 +32,10 @@ pub(super) fn mark(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, sp
         if is_short[v] {
             continue;
         }
-        corner[v] = chains.segments[v].iter().all(|s| chains.is_free(v, *s, spacing, corner));
-        if !corner[v] {
-            chains.mark_loop(v, spacing, corner, &mut is_short);
-        }
+        let [before, after] = chains.segments[v].map(|s| chains.near(v, s, spacing, corner));
+        corner[v] = before.is_none() && after.is_none();
+        let whole_loop = before.filter(|passed| passed.last() == Some(&v));
+        whole_loop.into_iter().flatten().for_each(|v| is_short[v] = true);
     }
 }
 
@@ -91,20 +91,19 @@ impl Chains {
         !self.segments[v].contains(&NONE)
     }
 
-    /// The vertex `steps` segments from `v`, beginning with `segment`; a nearer one where the chain ends before. Ends:
-    /// the steps are counted.
-    fn ahead(&self, v: usize, segment: u32, steps: usize) -> usize {
-        let (mut at, mut segment) = (v, segment);
-        for step in 1..=steps {
-            let [from, to] = self.ends[segment as usize].map(|v| v as usize);
-            at = if from == at { to } else { from };
-            if step == steps || at == v || !self.is_inner(at) {
-                break;
-            }
+    /// The vertices after `v` along the chain that begins with `segment`. Ends: with the vertex that is not inside the
+    /// chain, or with `v` itself.
+    fn walk(&self, v: usize, segment: u32) -> impl Iterator<Item = usize> {
+        let mut next = Some((v, segment));
+        std::iter::from_fn(move || {
+            let (from, segment) = next?;
+            let [a, b] = self.ends[segment as usize].map(|v| v as usize);
+            let at = if a == from { b } else { a };
             let [first, second] = self.segments[at];
-            segment = if first == segment { second } else { first };
-        }
-        at
+            let goes_on = at != v && self.is_inner(at);
+            next = goes_on.then_some((at, if first == segment { second } else { first }));
+            Some(at)
+        })
     }
 
     /// How the curve turns at `v`, as the largest cosine of the angles between the chords over [`SCALES`] edges to both
@@ -113,7 +112,7 @@ impl Chains {
     fn turn(&self, v: usize) -> Option<f64> {
         let mut largest = -1.0_f64;
         for steps in SCALES {
-            let ahead = self.segments[v].map(|s| self.ahead(v, s, steps));
+            let ahead = self.segments[v].map(|s| self.walk(v, s).take(steps).last().unwrap_or(v));
             if ahead.contains(&v) {
                 continue;
             }
@@ -128,41 +127,21 @@ impl Chains {
         (largest < SHARP.to_radians().cos()).then_some(largest)
     }
 
-    /// Marks all of a loop without corners that is shorter than `spacing`, if `v` lies on one. Ends as [`Self::is_free`] does.
-    fn mark_loop(&self, v: usize, spacing: f64, corner: &[bool], is_short: &mut [bool]) {
-        let (mut at, mut segment, mut length) = (v, self.segments[v][0], 0.0);
-        let mut passed = vec![v];
-        loop {
-            let next = self.ahead(at, segment, 1);
-            length += distance(self.places[at], self.places[next]);
-            if length >= spacing || corner[next] || !self.is_inner(next) {
-                return;
-            }
-            if next == v {
-                break;
-            }
-            passed.push(next);
-            let [first, second] = self.segments[next];
-            (at, segment) = (next, if first == segment { second } else { first });
-        }
-        passed.into_iter().for_each(|v| is_short[v] = true);
-    }
-
-    /// Whether there is no corner within `spacing` of `v` along the chain that begins with `segment`. Ends: at a corner,
-    /// when the length is reached, or at `v` itself.
-    fn is_free(&self, v: usize, segment: u32, spacing: f64, corner: &[bool]) -> bool {
-        let (mut at, mut segment, mut length) = (v, segment, 0.0);
-        loop {
-            let next = self.ahead(at, segment, 1);
+    /// The vertices from `v` to the first corner along the chain that begins with `segment`, or all around to `v` itself;
+    /// none where that is not within `spacing`.
+    fn near(&self, v: usize, segment: u32, spacing: f64, corner: &[bool]) -> Option<Vec<usize>> {
+        let (mut at, mut length, mut passed) = (v, 0.0, Vec::new());
+        for next in self.walk(v, segment) {
             length += distance(self.places[at], self.places[next]);
             if length >= spacing {
-                return true;
+                return None;
             }
-            if next == v || corner[next] || !self.is_inner(next) {
-                return false;
+            passed.push(next);
+            if corner[next] {
+                break;
             }
-            let [first, second] = self.segments[next];
-            (at, segment) = (next, if first == segment { second } else { first });
+            at = next;
         }
+        Some(passed)
     }
 }

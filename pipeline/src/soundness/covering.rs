@@ -1,7 +1,8 @@
 //! Does the mesh of a chart cover it once? In the map that the mesher used.
 //!
 //! Every triangle must be positive in the plane, and the boundary of the mesh simple and rightly nested there: then the
-//! mesh covers what the boundary encloses, once (see [`crate::certify::polygons`]). Decided exactly, on places rounded to the grid.
+//! mesh covers what the boundary encloses, once (see [`crate::certify::polygons`]). Decided exactly, on places rounded to
+//! the grid.
 //!
 //! Nodes on curves are placed on the chart's boundary in the plane, by where they lie on the curve; all others where the
 //! closest point of the chart is. A flat chart is its own map, whatever the other one does: Gmsh takes the plane of such
@@ -16,6 +17,7 @@ use crate::evaluate::{Plane, along_curve};
 use crate::grid::{GridPoint, orientation};
 use crate::id::{ChartId, VertexId};
 use crate::space::{Vec3, bits_of, unit_scale};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// Where the nodes of a mesh lie in the plane of the chart at hand, on the grid. One table serves all charts.
@@ -88,10 +90,12 @@ pub fn check(
             Defect::Folded { chart: id, triangles, at }
         });
     }
-    let open = &boundaries.open[id.index()];
-    // The loops of a mesh that is turned run the other way round, and may be right otherwise.
-    let turned: Vec<[VertexId; 2]> = if is_inside_out { open.iter().map(|[a, b]| [*b, *a]).collect() } else { vec![] };
-    defects.extend(boundary_defect(mesh, id, if is_inside_out { &turned } else { open }, in_plane));
+    let mut open = Cow::Borrowed(&boundaries.open[id.index()][..]);
+    if is_inside_out {
+        // The loops of a mesh that is turned run the other way round, and may be right otherwise.
+        open.to_mut().iter_mut().for_each(|edge| edge.reverse());
+    }
+    defects.extend(boundary_defect(mesh, id, &open, in_plane));
     defects
 }
 
