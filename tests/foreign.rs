@@ -14,16 +14,7 @@ const STAGING: &str = ".planish";
 
 /// Runs a small mesh as `part.stl`; each `twist` is another surface.
 fn run(out: &Out, twist: f64) -> Ended {
-    out.run_small("part.stl", &disk(3, twist))
-}
-
-impl Out {
-    fn run_small(&self, name: &str, bytes: &[u8]) -> Ended {
-        let inputs = tempfile::tempdir().expect("a folder");
-        let path = inputs.path().join(name);
-        fs::write(&path, bytes).expect("written");
-        self.run(&[&path], &[])
-    }
+    out.try_bytes("part.stl", &disk(3, twist), &[])
 }
 
 fn write(path: &Path, text: &str) {

@@ -66,10 +66,15 @@ impl Out {
 
     /// As [`Self::run_bytes`], with more arguments.
     pub fn run_bytes_with(&self, name: &str, bytes: &[u8], extra: &[&str]) -> (Ended, Report) {
+        (self.try_bytes(name, bytes, extra), self.report(name))
+    }
+
+    /// As [`Self::run_bytes_with`], where there may be no report.
+    pub fn try_bytes(&self, name: &str, bytes: &[u8], extra: &[&str]) -> Ended {
         let inputs = tempfile::tempdir().expect("a folder");
         let path = inputs.path().join(name);
         std::fs::write(&path, bytes).expect("written");
-        (self.run(&[&path], extra), self.report(name))
+        self.run(&[&path], extra)
     }
 
     /// The report of an input.
