@@ -20,6 +20,7 @@ pub mod logging;
 pub mod look;
 pub mod outcome;
 pub mod own;
+pub mod passing;
 pub mod places;
 pub mod publish;
 pub mod put_away;
