@@ -31,6 +31,9 @@ pub enum Verb {
     Info(Info),
     /// Tell what a running daemon does: queue, stages and progress, done, refused
     Status(Status),
+    /// Process one input for another planish
+    #[command(name = "job", hide = true)]
+    Apart(Apart),
 }
 
 /// `planish run`
@@ -130,9 +133,42 @@ pub struct Making {
     /// half of the machine's]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<ByteSize>,
+    /// The most memory that one input may take; more ends its process, and it is refused [default: no limit]
+    #[arg(long, value_name = "SIZE")]
+    pub job_memory: Option<ByteSize>,
+    /// The most seconds that one input may take, without its commands; then its process is ended, and it is refused
+    /// [default: no limit]
+    #[arg(long, value_name = "SECONDS")]
+    pub job_time: Option<f64>,
     /// Shared options
     #[command(flatten)]
     pub reading: Reading,
+}
+
+/// `planish job`, which planish itself starts
+#[derive(Debug, Args)]
+pub struct Apart {
+    /// The input
+    #[arg(value_name = "INPUT")]
+    pub input: PathBuf,
+    /// The name of its result
+    #[arg(long, allow_hyphen_values = true)]
+    pub name: PathBuf,
+    /// The folder for the files of its result
+    #[arg(long)]
+    pub into: PathBuf,
+    /// The folder out of which no link may lead
+    #[arg(long)]
+    pub within: Option<PathBuf>,
+    /// The mark of the input
+    #[arg(long)]
+    pub mark: Option<PathBuf>,
+    /// Whether it waits for files beside it
+    #[arg(long)]
+    pub waits: bool,
+    /// Shared options
+    #[command(flatten)]
+    pub common: Common,
 }
 
 /// `planish check`
@@ -221,9 +257,10 @@ impl Verb {
             Self::Watch(watch) => (&watch.common, watch.said()),
             Self::Check(check) => (&check.common, Said::default()),
             Self::Info(info) => (&info.common, Said { weld: info.reading.weld, ..Said::default() }),
+            Self::Apart(apart) => (&apart.common, Said { log: Some(Log::Json), ..Said::default() }),
             Self::Status(status) => (&status.common, Said { out: status.out.clone(), ..Said::default() }),
         };
-        said.log = common.log;
+        said.log = common.log.or(said.log);
         said.verbose = (common.verbose > 0).then_some(common.verbose);
         said.quiet = common.quiet.then_some(true);
         let file = common.config.as_deref().map(Said::from_file).transpose()?;
@@ -258,6 +295,8 @@ impl Making {
             force: self.force.then_some(true),
             jobs: self.jobs,
             memory: self.memory,
+            job_memory: self.job_memory,
+            job_time: self.job_time,
             ..Said::default()
         }
     }

@@ -6,51 +6,62 @@
 //!
 //! * There are three such belts, for small, middling and large inputs, so that no small input waits in a channel behind
 //!   the charts of a large one. Among themselves inputs wait in a fair order ([`queue`]).
-//! * No more computations run at once than `--jobs` says, over all belts ([`turnstile`]). Nobody waits for a channel,
-//!   memory or a disk while it holds a place; and channels lead forward only. So somebody always moves.
+//! * What is large is done by a process of its own ([`apart`]), which has the same stages, so that what it dies of is its
+//!   own affair.
+//! * No more computations run at once than `--jobs` says, over all belts and processes ([`turnstile`]). Nobody waits for a
+//!   channel, memory or a disk while it holds a place; and channels lead forward only. So somebody always moves.
 //! * Inputs take memory before they are read, charts before they are factorised ([`budget`]).
 //! * A panic is caught where it happens and is a failure of its job. A job's end is told exactly once.
 //! * What comes out does not depend on any of this: charts are put together in their order.
 //!
 //! When no more inputs come, the stages end front to back, as each closes the channel to the next.
 
+pub mod apart;
 pub mod board;
 pub mod budget;
+mod grants;
 pub mod queue;
+mod reading;
 mod surface;
 mod travel;
 pub mod turnstile;
+mod writing;
 
+use crate::begun::Begun;
 use crate::chain::{self, Followed};
-use crate::formats::{Content, Notes};
 use crate::job::{Done, End, Job, Stage, Stopped};
-use crate::ledger;
-use crate::outcome::{Code, Reason, Status};
+use crate::outcome::Status;
 use crate::publish::{PublishError, Publisher};
-use crate::report::{self, Input, Report};
+use crate::report::Report;
 use crate::settings::Settings;
-use crate::stages::{self, Files};
+use crate::stages;
+use apart::parent::Parent;
+use apart::stage::do_apart;
 use board::Running;
-use budget::Budget;
 use crossbeam_channel::{Receiver, Sender, bounded};
+use grants::{Grants, Own};
+use parking_lot::RwLock;
 use pipeline::MappedChart;
 use pipeline::atlas::Chart;
 use pipeline::host::Host;
 use pipeline::mesh::TriangleSoup;
 use queue::Queue;
+use reading::Next;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 use surface::{Place, Surface};
 pub use travel::Ended;
 use travel::{Shared, Travel};
-use turnstile::Turnstile;
+use writing::{After, Sink};
 
 /// Ended jobs that nobody has asked for yet, at most.
 const ENDED: usize = 64;
 
-/// Results that wait for their commands, at most: they hold no memory to speak of.
+/// Results that wait for their commands, or to be put in place, at most: the former hold no memory to speak of, the latter
+/// what the budget gives them.
 const CHAINED: usize = 1024;
 
 /// Results that are written at once, per belt: writing waits for the disk.
@@ -64,50 +75,74 @@ pub struct Conveyor {
 }
 
 impl Conveyor {
-    /// Starts the stages.
+    /// Starts the stages. One that is `patient` keeps results that cannot be written until they can.
     ///
     /// # Errors
     /// Where the system has no more threads.
-    pub fn start(settings: &Settings, publisher: Arc<Publisher>) -> std::io::Result<Self> {
-        let (ended, to_tell) = bounded(ENDED);
-        let shared = Arc::new(Shared {
-            settings: settings.clone(),
-            publisher,
-            queue: Queue::default(),
-            turnstile: Turnstile::new(settings.jobs),
-            budget: Budget::new(settings.memory),
-            board: board::Board::default(),
-            ended,
-        });
-        let mut conveyor = Self { shared, ended: to_tell, threads: Vec::new() };
+    pub fn start(settings: &Settings, publisher: Arc<Publisher>, is_patient: bool) -> std::io::Result<Self> {
+        let begun = Begun::new(publisher.out(), publisher.staging());
+        let grants = Arc::new(Own::new(settings.jobs, settings.memory));
+        let mut conveyor = Self::idle(settings, Sink::Out(publisher), grants, Some(begun), is_patient);
         let (chain, chained) = bounded(CHAINED);
+        let (parked, to_look_after) = bounded(CHAINED);
+        let after = Arc::new(After { chain, parked });
         for belt in 0..queue::BELTS {
-            conveyor.belt(belt, &chain)?;
+            conveyor.belt(belt, &after)?;
         }
+        let chain = after.chain.clone();
+        conveyor.thread("parked", move || writing::look_after(to_look_after, &chain))?;
+        drop(after);
         conveyor.stage("chain", settings.jobs, chained, follow_up)?;
         Ok(conveyor)
     }
 
+    /// Starts the stages for a single input of `bytes`, whose files go to `folder`; its `parent` has places and memory.
+    ///
+    /// # Errors
+    /// Where the system has no more threads.
+    pub fn start_apart(settings: &Settings, folder: &Path, bytes: u64, parent: Arc<Parent>) -> std::io::Result<Self> {
+        let mut conveyor = Self::idle(settings, Sink::Folder(folder.to_owned()), parent, None, false);
+        // Nothing follows in this process.
+        let (chain, _) = bounded(1);
+        let (parked, _) = bounded(1);
+        conveyor.belt(queue::belt(bytes), &Arc::new(After { chain, parked }))?;
+        Ok(conveyor)
+    }
+
+    fn idle(settings: &Settings, sink: Sink, grants: Arc<dyn Grants>, begun: Option<Begun>, is_patient: bool) -> Self {
+        let (ended, to_tell) = bounded(ENDED);
+        let settings = RwLock::new(Arc::new(settings.clone()));
+        let (queue, board) = (Queue::default(), board::Board::default());
+        let shared = Arc::new(Shared { settings, sink, begun, is_patient, queue, grants, board, ended });
+        Self { shared, ended: to_tell, threads: Vec::new() }
+    }
+
     /// Starts the stages of one belt.
-    fn belt(&mut self, belt: usize, chain: &Sender<Chained>) -> std::io::Result<()> {
-        let jobs = self.shared.settings.jobs;
+    fn belt(&mut self, belt: usize, after: &Arc<After>) -> std::io::Result<()> {
+        let jobs = self.shared.settings().jobs;
         let (soups, to_cut) = bounded(1);
+        let (apart, to_do_apart) = bounded(1);
         let (charts, to_map) = bounded(jobs);
         let (mapped, to_untangle) = bounded(jobs);
         let (finished, to_write) = bounded(jobs);
-        let (shared, refused, checked) = (self.shared.clone(), finished.clone(), chain.clone());
+        let shared = self.shared.clone();
+        let next = Next { soups, apart, finished: finished.clone(), chain: after.chain.clone() };
         self.thread("read", move || {
             while let Some(waiting) = shared.queue.pop(belt) {
-                survive(|| read(Travel::begin(&shared, waiting), &soups, &refused, &checked));
+                survive(|| reading::read(Travel::begin(&shared, waiting), &next));
             }
         })?;
+        if self.shared.sink.publisher().is_some() {
+            let (refused, after) = (finished.clone(), after.clone());
+            self.stage("apart", jobs, to_do_apart, move |one| do_apart(one, &refused, &after))?;
+        }
         let refused = finished.clone();
         self.stage("decompose", jobs, to_cut, move |soup| cut(soup, &charts, &refused))?;
         let refused = finished.clone();
         self.stage("map", jobs, to_map, move |chart| map(chart, &mapped, &refused))?;
         self.stage("untangle", jobs, to_untangle, move |mapped| untangle(mapped, &finished))?;
-        let chain = chain.clone();
-        self.stage("write", jobs.max(WRITERS), to_write, move |finished| write(finished, &chain))
+        let after = after.clone();
+        self.stage("write", jobs.max(WRITERS), to_write, move |finished| writing::write(finished, &after))
     }
 
     /// Starts `count` threads that do `work` on everything that comes, until no more can come.
@@ -223,92 +258,8 @@ fn hand_on<T>(to: &Sender<T>, item: T) {
     let _ = to.send(item);
 }
 
-fn read(travel: Arc<Travel>, soups: &Sender<Soup>, finished: &Sender<Finished>, chain: &Sender<Chained>) {
-    if !travel.job.is_wanted() {
-        return travel.end(End::Unwanted);
-    }
-    if !travel.job.is_unchanged() {
-        return travel.end(End::Changed);
-    }
-    if let Err(error) = travel.shared.publisher.admits(&travel.job.name) {
-        let _in_stage = travel.in_stage(Stage::Read);
-        return unwritten(&travel, error);
-    }
-    let content = stages::read_input(&travel.job, &travel.shared.settings);
-    if !travel.job.is_unchanged() {
-        return travel.end(End::Changed);
-    }
-    let Shared { settings, publisher, .. } = &*travel.shared;
-    let mut report = Report::new(input(&travel.job, content.as_deref().ok()), settings);
-    let folder = stages::Folder::of_job(&travel.job);
-    let decoded = travel.compute(Stage::Read, |_| {
-        let bytes = content?;
-        report.input.blake3 = Some(blake3::hash(&bytes).to_hex().to_string());
-        let older = if settings.force {
-            None
-        } else {
-            ledger::up_to_date(&publisher.target(&travel.job.name), &report, &folder)
-        };
-        Ok(match older {
-            Some(older) => Err(older),
-            None => {
-                let content = stages::decode(&travel.job.path, &bytes, settings, &folder);
-                Ok(content.map_err(|refusal| {
-                    report.content = refusal.notes.map(|notes| *notes);
-                    refusal.reason
-                })?)
-            }
-        })
-    });
-    travel.job.set_beside(folder.asked());
-    report.input.beside = folder.read();
-    match decoded {
-        Ok(Ok(Content { soup, notes })) => {
-            warn_of_doubts(&travel, &notes);
-            report.content = Some(notes);
-            hand_on(soups, Soup { travel, report, soup });
-        }
-        Ok(Err(older)) => {
-            travel.job.set_beside(older.input.beside.iter().map(|o| o.file.clone()).collect());
-            let _in_stage = travel.in_stage(Stage::Read);
-            tracing::info!(status = %older.status, "is up to date");
-            published(travel.clone(), Done { report: older, up_to_date: true }, chain);
-        }
-        Err(Stopped::For(reason)) if reason.code == Code::MissingFile && travel.job.since.is_some() => {
-            travel.end(End::Waiting(reason));
-        }
-        Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
-    }
-}
-
-/// Tells where a file leaves open what its surface is.
-fn warn_of_doubts(travel: &Travel, notes: &Notes) {
-    if notes.polygons_doubtful > 0 {
-        let _in_stage = travel.in_stage(Stage::Read);
-        tracing::warn!(
-            polygons = notes.polygons_doubtful,
-            "polygons cross themselves, or are too intricate: the triangles they were cut into may fold; export the \
-             surface as triangles"
-        );
-    }
-    for remark in &notes.remarks {
-        let _in_stage = travel.in_stage(Stage::Read);
-        tracing::warn!("{remark}");
-    }
-}
-
-fn input(job: &Job, content: Option<&[u8]>) -> Input {
-    Input {
-        name: job.name.to_string_lossy().into_owned(),
-        bytes: content.map(|c| c.len() as u64),
-        blake3: None,
-        beside: vec![],
-    }
-}
-
 fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
-    let settings = &travel.shared.settings;
-    match travel.compute(Stage::Decompose, |host| stages::cut(soup, settings, &mut report, host)) {
+    match travel.compute(Stage::Decompose, |host| stages::cut(soup, &travel.settings, &mut report, host)) {
         Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
         Ok((mesh, parts)) => {
             let surface = Surface::new(travel, mesh, parts.len(), report);
@@ -321,7 +272,7 @@ fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: 
 
 fn map(Cut { surface, place, chart }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
     let travel = &surface.travel;
-    let work = |host: &dyn Host| stages::map(&surface.mesh, chart, &travel.shared.settings, host);
+    let work = |host: &dyn Host| stages::map(&surface.mesh, chart, &travel.settings, host);
     let parts = if surface.is_due(place) { travel.compute(Stage::Map, work) } else { Err(Stopped::Unwanted) };
     match parts {
         Err(why) => deposit(surface, place, Err(why), finished),
@@ -336,7 +287,7 @@ fn map(Cut { surface, place, chart }: Cut, untangle: &Sender<Mapped>, finished: 
 
 fn untangle(Mapped { surface, place, mapped }: Mapped, finished: &Sender<Finished>) {
     let travel = &surface.travel;
-    let work = |host: &dyn Host| stages::untangle(&surface.mesh, mapped, &travel.shared.settings, host);
+    let work = |host: &dyn Host| stages::untangle(&surface.mesh, mapped, &travel.settings, host);
     let part = if surface.is_due(place) { travel.compute(Stage::Untangle, work) } else { Err(Stopped::Unwanted) };
     deposit(surface, place, part, finished);
 }
@@ -352,57 +303,9 @@ fn deposit(
     }
 }
 
-fn write(finished: Finished, chain: &Sender<Chained>) {
-    let (travel, mut report, files) = match finished {
-        Finished::Stopped(travel, report, why) => (travel, *report, Err(why)),
-        Finished::Surface(surface) => {
-            let (mut report, done) = surface.collect();
-            let settings = &surface.travel.shared.settings;
-            let assembled = surface.travel.compute(Stage::Write, |_| {
-                Ok(stages::assemble(&surface.mesh, done?, surface.whole, settings, &mut report)?)
-            });
-            (surface.travel.clone(), report, assembled)
-        }
-    };
-    let _in_stage = travel.in_stage(Stage::Write);
-    let files = match files {
-        Ok(files) => files,
-        Err(Stopped::Unwanted) => return travel.end(End::Unwanted),
-        Err(Stopped::For(reason)) => {
-            refuse(&mut report, reason);
-            Files::new()
-        }
-    };
-    report.timing = travel.timing();
-    match publish(&travel, &report, files) {
-        Ok(true) => {
-            log(&report);
-            published(travel.clone(), Done { report, up_to_date: false }, chain);
-        }
-        Ok(false) => travel.end(if travel.job.is_wanted() { End::Changed } else { End::Unwanted }),
-        Err(error) => unwritten(&travel, error),
-    }
-}
-
-/// The report of an input that is refused, or failed.
-fn refuse(report: &mut Report, reason: Reason) {
-    report.status = reason.status();
-    if reason.code == Code::Internal {
-        // What a stage that broke down left in it is not to be trusted.
-        report.charts.clear();
-        report.outputs.clear();
-    }
-    report.reason = Some(reason);
-}
-
 fn unwritten(travel: &Travel, error: PublishError) {
     tracing::error!("the result is not written: {error}");
     travel.end(End::Unwritten(error));
-}
-
-fn publish(travel: &Travel, report: &Report, mut files: Files) -> Result<bool, PublishError> {
-    files.push((report::FILE.to_owned(), report.to_json().map_err(PublishError::Report)?));
-    travel.shared.publisher.publish(&travel.job.name, &files, || travel.job.is_wanted() && travel.job.is_unchanged())
 }
 
 fn log(report: &Report) {
@@ -417,7 +320,7 @@ fn log(report: &Report) {
 /// their own.
 fn published(travel: Arc<Travel>, done: Done, chain: &Sender<Chained>) {
     travel.give_memory_back();
-    if done.report.status == Status::Certified && chain::is_asked_for(&travel.shared.settings) {
+    if done.report.status == Status::Certified && chain::is_asked_for(&travel.settings) {
         hand_on(chain, Chained { travel, done });
     } else {
         travel.end(End::Done(done));
@@ -428,8 +331,8 @@ fn published(travel: Arc<Travel>, done: Done, chain: &Sender<Chained>) {
 fn follow_up(Chained { travel, done }: Chained) {
     travel.reached(Stage::Chain);
     let _in_stage = travel.in_stage(Stage::Chain);
-    let Shared { settings, publisher, .. } = &*travel.shared;
-    travel.end(match chain::run(&travel.job, &done.report, settings, publisher) {
+    let Some(publisher) = travel.shared.sink.publisher() else { return };
+    travel.end(match chain::run(&travel.job, &done.report, &travel.settings, publisher) {
         Ok(Followed::Whole) => End::Done(done),
         Ok(Followed::BrokenOff) => End::Unwanted,
         Ok(Followed::Until(then)) => End::Later(done, then),

@@ -1,19 +1,37 @@
 //! The daemon: what is seen in the inbox becomes jobs, what is asked from outside is done.
 
 use crate::conveyor::{Conveyor, Ended};
-use crate::inbox::{Change, Inbox};
-use crate::job::{End, Job};
+use crate::inbox::{Change, Doubt, Inbox, Rest};
+use crate::job::{Done, End, Job};
+use crate::publish::Publisher;
+use crate::report;
 use crate::settings::Settings;
 use crate::shown::shown;
-use crate::status::{Counts, Lock, NAMED, Progress, Status};
+use crate::status::{self, Counts, Held, Lock, NAMED, Noted, Progress, Status, Trouble};
 use crate::watch::{Event, Eyes, Stop};
+use blake3::Hash;
 use std::collections::BTreeMap;
+use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
-/// A job that could not be ended is tried again after this.
-const AGAIN: Duration = Duration::from_secs(30);
+/// A job whose file has changed is done again after this.
+const SOON: Duration = Duration::from_secs(1);
+
+/// The content of an input that stays is looked at once more after this: what is written through shared memory changes
+/// neither size nor times.
+const DOUBT: Duration = Duration::from_secs(30);
+
+/// An input that is not done after this is worth a warning.
+const LONG: Duration = Duration::from_secs(600);
+
+/// So many results at most are looked for whenever the inbox is looked at.
+const LOOKED_FOR: usize = 500;
+
+/// The status is told at least this often, so that one knows that the daemon lives.
+const ALIVE: Duration = Duration::from_secs(10);
 
 /// The status is told at most this often.
 const TELL: Duration = Duration::from_millis(500);
@@ -40,8 +58,8 @@ enum Phase {
 pub struct Daemon<'a> {
     settings: &'a Settings,
     conveyor: &'a Conveyor,
-    lock: &'a Lock,
-    staging: &'a Path,
+    lock: &'a mut Lock,
+    publisher: &'a Publisher,
     eyes: Eyes,
     inbox: Inbox,
     jobs: BTreeMap<PathBuf, Arc<Job>>,
@@ -51,6 +69,10 @@ pub struct Daemon<'a> {
     next_tell: Instant,
     /// Whether something may have changed since the status was told.
     untold: bool,
+    /// Whether the status could be told the last time.
+    is_told: bool,
+    /// Whether it was told that the lock cannot be looked at.
+    is_lock_unknown: bool,
 }
 
 impl<'a> Daemon<'a> {
@@ -59,17 +81,16 @@ impl<'a> Daemon<'a> {
         inbox: &Path,
         settings: &'a Settings,
         conveyor: &'a Conveyor,
-        (lock, staging): (&'a Lock, &'a Path),
+        (lock, publisher): (&'a mut Lock, &'a Publisher),
     ) -> Self {
-        let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs());
-        let status =
-            Status { pid: std::process::id(), inbox: inbox.to_string_lossy().into_owned(), since, ..Status::default() };
+        let (pid, since) = (std::process::id(), status::now());
+        let status = Status { pid, inbox: inbox.to_string_lossy().into_owned(), since, ..Status::default() };
         let now = Instant::now();
         Self {
             settings,
             conveyor,
             lock,
-            staging,
+            publisher,
             eyes: Eyes::new(inbox, settings.recursive, settings.poll),
             inbox: Inbox::default(),
             jobs: BTreeMap::new(),
@@ -78,6 +99,8 @@ impl<'a> Daemon<'a> {
             next_look: now,
             next_tell: now,
             untold: true,
+            is_told: true,
+            is_lock_unknown: false,
         }
     }
 
@@ -87,14 +110,12 @@ impl<'a> Daemon<'a> {
     /// [`OutIsGone`]: there is no place for results any more.
     pub fn run(mut self, stop: &Stop) -> Result<Counts, OutIsGone> {
         loop {
-            if !self.lock.is_held() {
-                return Err(OutIsGone);
-            }
+            self.hold_lock()?;
             let now = Instant::now();
             if self.phase == Phase::Watching && now >= self.next_look {
                 self.look(now);
             }
-            if now >= self.next_tell && (self.untold || !self.jobs.is_empty()) {
+            if now >= self.next_tell && self.is_to_tell(now) {
                 self.tell(now);
             }
             let event = self.next_event(stop);
@@ -116,15 +137,40 @@ impl<'a> Daemon<'a> {
         }
     }
 
+    /// Sees that this is still the one daemon of the output folder.
+    fn hold_lock(&mut self) -> Result<(), OutIsGone> {
+        let held = self.lock.hold();
+        match &held {
+            Held::No => return Err(OutIsGone),
+            Held::Yes => {}
+            Held::Again => tracing::warn!("the lock of the output folder was removed, and is taken again"),
+            Held::Unknown(_) if self.is_lock_unknown => {}
+            Held::Unknown(error) => {
+                self.must_be_seen_to(format!("the lock of the output folder cannot be looked at: {error}"));
+            }
+        }
+        self.is_lock_unknown = matches!(held, Held::Unknown(_));
+        Ok(())
+    }
+
+    /// Says what an operator must act on.
+    fn must_be_seen_to(&mut self, message: String) {
+        tracing::error!("{message}");
+        self.status.last_error = Some(Trouble::now(message));
+    }
+
+    fn is_to_tell(&self, now: Instant) -> bool {
+        self.untold || !self.jobs.is_empty() || now >= self.next_tell + ALIVE
+    }
+
     fn next_event(&self, stop: &Stop) -> Event {
         let mut wake = match self.phase {
             Phase::Watching => self.next_look,
             Phase::Draining => Instant::now() + TELL,
             Phase::Stopping(latest) => latest,
         };
-        if self.untold || !self.jobs.is_empty() {
-            wake = wake.min(self.next_tell);
-        }
+        let tell = if self.untold || !self.jobs.is_empty() { self.next_tell } else { self.next_tell + ALIVE };
+        wake = wake.min(tell);
         self.eyes.wait(self.conveyor, stop, wake)
     }
 
@@ -137,6 +183,8 @@ impl<'a> Daemon<'a> {
             for change in self.inbox.look(&listing, now) {
                 self.follow(change);
             }
+            self.look_for_results(now);
+            self.warn_of_overdue(now);
             self.look_when_due();
         }
         self.next_look = self.next_look.max(self.eyes.rested());
@@ -148,11 +196,35 @@ impl<'a> Daemon<'a> {
         self.next_look = due.map_or(self.next_look, |due| due.min(self.next_look));
     }
 
+    /// Sees whether results are still there: who removes one has its input done again.
+    fn look_for_results(&mut self, now: Instant) {
+        for name in self.inbox.published(LOOKED_FOR) {
+            let report = self.publisher.target(&name).join(report::FILE);
+            if fs::symlink_metadata(report).is_err_and(|e| e.kind() == ErrorKind::NotFound) {
+                tracing::info!(input = shown(&name), "its result was removed: it is done again");
+                self.inbox.forget(&name, now);
+            }
+        }
+    }
+
+    fn warn_of_overdue(&mut self, now: Instant) {
+        for notable in self.inbox.overdue(now, LONG) {
+            let minutes = now.saturating_duration_since(notable.since).as_secs() / 60;
+            let (input, state) = (shown(notable.name), notable.state);
+            tracing::warn!(input, state, minutes, "is not done: {}", notable.reason);
+        }
+    }
+
     fn follow(&mut self, change: Change) {
         match change {
             Change::Settled(name, look, since) => {
                 tracing::debug!(input = shown(&name), bytes = look.bytes, "settled");
                 let job = Arc::new(Job::of_inbox(self.eyes.inbox(), &name, look, since));
+                self.jobs.insert(name, job.clone());
+                self.conveyor.submit(job);
+            }
+            Change::Doubted(name, look, hash) => {
+                let job = Arc::new(Job::of_inbox(self.eyes.inbox(), &name, look, Instant::now()).doubting(hash));
                 self.jobs.insert(name, job.clone());
                 self.conveyor.submit(job);
             }
@@ -168,35 +240,64 @@ impl<'a> Daemon<'a> {
     fn ended(&mut self, Ended { job, end }: Ended) {
         if let Some(done) = end.standing().filter(|done| !done.up_to_date) {
             self.status.ended.count(done.report.status);
-        } else if matches!(end, End::Lost) {
-            tracing::error!(
-                input = shown(&job.name),
-                "a stage broke down: that is a fault of planish; please report it"
-            );
+            self.status.last_published = Some(status::now());
         }
         // A withdrawn job says nothing about the file that has its name now.
         if self.jobs.get(&job.name).is_some_and(|current| Arc::ptr_eq(current, &job)) {
             self.jobs.remove(&job.name);
-            let Some(look) = job.look else { return };
-            self.eyes.look_beside(&job.name, job.beside());
-            match end {
-                End::Done(_) => self.inbox.done(&job.name, &look),
-                End::Later(_, then) => self.inbox.again(&job.name, &look, then),
-                // What it waits for is part of what is seen of it now.
-                End::Waiting(reason) => {
-                    tracing::info!(input = shown(&job.name), "waits: {}", reason.message);
-                    self.inbox.done(&job.name, &look);
-                }
-                End::Changed | End::Outdated(_) => {
-                    self.inbox.again(&job.name, &look, Instant::now() + Duration::from_secs(1));
-                }
-                End::Unwritten(error) if error.is_lasting() => self.inbox.done(&job.name, &look),
-                End::Unwanted | End::Unwritten(_) | End::Unchained(..) | End::Lost => {
-                    self.inbox.again(&job.name, &look, Instant::now() + AGAIN);
-                }
-            }
+            self.rest(&job, end);
             self.look_when_due();
         }
+    }
+
+    /// What becomes of a file whose job has ended.
+    fn rest(&mut self, job: &Job, end: End) {
+        let (name, now) = (&job.name, Instant::now());
+        let Some(look) = &job.look else { return };
+        if job.doubted.is_none() {
+            self.eyes.look_beside(name, job.beside());
+        }
+        match end {
+            End::Done(done) => {
+                let doubt = self.doubt(&done, now);
+                self.inbox.done(name, look, Rest::Published, doubt);
+            }
+            End::Same => self.inbox.done(name, look, Rest::Published, None),
+            End::Later(_, then) => {
+                self.inbox.again(name, look, then, "it is put away when it has not changed for ten seconds");
+            }
+            // What it waits for is part of what is seen of it now.
+            End::Waiting(reason) => {
+                tracing::info!(input = shown(name), "waits: {}", reason.message);
+                self.inbox.done(name, look, Rest::Waits(reason.message), None);
+            }
+            End::Changed | End::Outdated(_) => self.inbox.again(name, look, now + SOON, "it has changed"),
+            End::Again(reason) => self.inbox.failed(name, look, now, &reason.message),
+            End::Unwanted => self.inbox.failed(name, look, now, "its job was cancelled"),
+            End::Unwritten(error) => {
+                self.status.last_error = Some(Trouble::now(&error));
+                if error.is_lasting() {
+                    self.inbox.done(name, look, Rest::Aside(error.to_string()), None);
+                } else {
+                    self.inbox.failed(name, look, now, &error.to_string());
+                }
+            }
+            End::Unchained(_, message) => {
+                self.status.last_error = Some(Trouble::now(&message));
+                self.inbox.failed(name, look, now, &message);
+            }
+            End::Lost => {
+                let message = "a stage broke down: that is a fault of planish; please report it";
+                self.must_be_seen_to(format!("{}: {message}", shown(name)));
+                self.inbox.failed(name, look, now, message);
+            }
+        }
+    }
+
+    /// Whether and when the content of an input that is done with is looked at once more.
+    fn doubt(&self, done: &Done, now: Instant) -> Option<Doubt> {
+        let hash = done.report.input.blake3.as_deref()?;
+        Some((now + DOUBT, Hash::from_hex(hash).ok()?))
     }
 
     /// The first time politely, then at once.
@@ -222,10 +323,18 @@ impl<'a> Daemon<'a> {
         self.status.next = waiting.iter().take(NAMED).map(|job| job.name.to_string_lossy().into_owned()).collect();
         self.status.running = self.conveyor.running().into_iter().map(Progress::from).collect();
         self.status.unsettled = self.inbox.unsettled();
+        self.status.notables = self.inbox.notable().count();
+        self.status.notable = self.inbox.notable().take(NAMED).map(Noted::from).collect();
+        self.status.oldest = self.inbox.oldest().map(|since| status::tenths(since.elapsed()));
+        self.status.told = status::now();
         self.status.log_lines_lost = crate::logging::lost();
-        if let Err(error) = self.lock.tell(&self.status, self.staging) {
+        let told = self.lock.tell(&self.status, self.publisher.staging());
+        if let Err(error) = &told
+            && self.is_told
+        {
             tracing::warn!("the status for `planish status` cannot be written: {error}");
         }
+        self.is_told = told.is_ok();
         self.next_tell = now + TELL;
         self.untold = false;
     }

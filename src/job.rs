@@ -5,7 +5,9 @@ use crate::outcome::Reason;
 use crate::publish::PublishError;
 use crate::regular::{self, OpenError};
 use crate::report::Report;
+use blake3::Hash;
 use parking_lot::Mutex;
+use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,12 +28,15 @@ pub struct Job {
     pub since: Option<Instant>,
     /// The folder out of which no link may lead; none where the user named the file itself.
     pub within: Option<PathBuf>,
+    /// The hash of its content when it was done: the job is to see whether it still is that.
+    pub doubted: Option<Hash>,
     unwanted: AtomicBool,
     beside: Mutex<Vec<String>>,
 }
 
 /// The stages, as progress is told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Stage {
     /// Reading bytes and decoding them.
     Read,
@@ -48,6 +53,14 @@ pub enum Stage {
 }
 
 impl Stage {
+    /// All stages, in their order.
+    const ALL: [Self; 6] = [Self::Read, Self::Decompose, Self::Map, Self::Untangle, Self::Write, Self::Chain];
+
+    /// The stage of this name.
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|stage| stage.name() == name)
+    }
+
     /// The name of the stage.
     pub fn name(self) -> &'static str {
         match self {
@@ -85,12 +98,16 @@ pub enum End {
     Later(Done, Instant),
     /// Its result stands, but when its input was to be put away, that was something else: it is to be processed again.
     Outdated(Done),
+    /// It was doubted, and is what it was.
+    Same,
     /// It was no longer wanted: nothing was published.
     Unwanted,
     /// The file is not what was seen, or gone: nothing was published.
     Changed,
     /// The file names another one that is not there, or not yet as long as it says: nothing was published.
     Waiting(Reason),
+    /// The system got in the way, for a reason that passes: nothing was published, and it is to be tried again.
+    Again(Reason),
     /// The result could not be written.
     Unwritten(PublishError),
     /// A stage broke down outside the work on this job: a fault of planish. Nothing was published.
@@ -104,7 +121,13 @@ impl End {
     pub fn standing(&self) -> Option<&Done> {
         match self {
             Self::Done(done) | Self::Later(done, _) | Self::Outdated(done) | Self::Unchained(done, _) => Some(done),
-            Self::Unwanted | Self::Changed | Self::Waiting(_) | Self::Unwritten(_) | Self::Lost => None,
+            Self::Same
+            | Self::Unwanted
+            | Self::Changed
+            | Self::Waiting(_)
+            | Self::Again(_)
+            | Self::Unwritten(_)
+            | Self::Lost => None,
         }
     }
 }
@@ -122,7 +145,7 @@ impl Job {
     /// The job for a file whose result goes to `name`.
     pub fn new(path: PathBuf, name: PathBuf, bytes: u64) -> Self {
         let (unwanted, beside) = (AtomicBool::new(false), Mutex::default());
-        Self { path, name, bytes, look: None, since: None, within: None, unwanted, beside }
+        Self { path, name, bytes, look: None, since: None, within: None, doubted: None, unwanted, beside }
     }
 
     /// The job for a file that is named: its result has its name.
@@ -141,6 +164,11 @@ impl Job {
     pub fn of_inbox(inbox: &Path, name: &Path, look: Look, since: Instant) -> Self {
         let (path, look, since, within) = (inbox.join(name), Some(look), Some(since), Some(inbox.to_owned()));
         Self { since, within, look, ..Self::new(path, name.to_owned(), look.map_or(0, |look| look.bytes)) }
+    }
+
+    /// This job, if it is only to see whether the file still has the content with this hash.
+    pub fn doubting(self, hash: Hash) -> Self {
+        Self { doubted: Some(hash), ..self }
     }
 
     /// Opens the file.

@@ -1,6 +1,6 @@
 //! The ledger: which inputs are done. There is no other one than the published reports.
 
-use crate::outcome::{Reason, Status};
+use crate::outcome::{Code, Reason, Status};
 use crate::regular::{self, OpenError};
 use crate::report::{self, Input, Output, Report};
 use crate::stages::{Folder, read_file};
@@ -10,7 +10,7 @@ use walkdir::{DirEntry, WalkDir};
 
 /// The report published in `folder`, if it is that of the same content, settings and version as `fresh`, of a file and
 /// those `beside` it, and its files are there, unharmed. A failure is none: another version may do better, or another
-/// day.
+/// day; but planish does not die twice of the same. Nor is a refusal for a limit, which may have been raised since.
 pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Folder) -> Option<Report> {
     let older: Report = serde_json::from_slice(&read_file(&folder.join(report::FILE)).ok()?).ok()?;
     let same = Input { beside: vec![], ..older.input.clone() } == fresh.input
@@ -19,10 +19,18 @@ pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Folder) -> Option<Repo
         && older.input.beside.iter().all(|read| beside.still_has(read))
         && older.settings == fresh.settings
         && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
-        && older.status != Status::Failed;
+        && is_final(&older);
     let there = |o: &Output| holds(folder, o).is_ok_and(|it_does| it_does);
     let complete = (older.status == Status::Certified) != older.outputs.is_empty();
     (same && complete && older.outputs.iter().all(there)).then_some(older)
+}
+
+fn is_final(report: &Report) -> bool {
+    match report.reason.as_ref().map(|reason| reason.code) {
+        Some(Code::Crashed) => true,
+        Some(Code::TooLarge | Code::JobMemory | Code::JobTime) => false,
+        _ => report.status != Status::Failed,
+    }
 }
 
 /// Whether `folder` holds this file as it was published. One of another size is not read.

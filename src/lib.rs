@@ -4,6 +4,7 @@
 //! touches disk, clock, threads and environment. The verbs are in [`verbs`]; an input travels as a [`job::Job`] through
 //! the [`stages`], which [`conveyor`] runs on threads.
 
+pub mod begun;
 pub mod chain;
 pub mod cli;
 pub mod conveyor;

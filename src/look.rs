@@ -1,11 +1,12 @@
 //! What a look at a file shows: enough to tell whether it changed since.
 
+use serde::{Deserialize, Serialize};
 use std::fs::Metadata;
 use std::io;
 use std::path::Path;
 
 /// What a look at a regular file shows. Two looks differ where the file was written to, or another one took its name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Look {
     /// Its size in bytes.
     pub bytes: u64,
@@ -14,7 +15,7 @@ pub struct Look {
 }
 
 /// Which file or folder it is, whatever its name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity([u64; 2]);
 
 impl Identity {

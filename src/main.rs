@@ -29,6 +29,7 @@ fn dispatch(verb: &Verb, settings: &Settings) -> Result<Exit, Box<dyn std::error
             None => Ok(verbs::check::check(&check.results, settings.quiet)),
         },
         Verb::Info(info) => verbs::info::info(&info.inputs, info.json, settings),
+        Verb::Apart(apart) => verbs::job::job(apart, settings),
         Verb::Status(status) => verbs::status::status(status.json, settings),
     }
 }

@@ -61,6 +61,12 @@ pub enum Code {
     NeedsDecomposition,
     /// A single triangle cannot be mapped.
     NeedsSplit,
+    /// It takes more memory than an input may.
+    JobMemory,
+    /// It takes more time than an input may.
+    JobTime,
+    /// planish died of it, again and again.
+    Crashed,
     /// A fault of planish.
     Internal,
 }
@@ -90,7 +96,7 @@ impl Reason {
 
     /// The state that this reason leads to.
     pub fn status(&self) -> Status {
-        if self.code == Code::Internal { Status::Failed } else { Status::Refused }
+        if matches!(self.code, Code::Internal | Code::Crashed) { Status::Failed } else { Status::Refused }
     }
 }
 

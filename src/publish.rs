@@ -5,6 +5,7 @@
 //! Each process has a staging folder of its own, held by a lock; folders whose process is gone are cleared at the next
 //! start. What is published is the ledger of what was done: see [`crate::ledger`].
 
+use crate::begun;
 use crate::own;
 use crate::replace::{self, NotKept};
 use crate::shown::shown;
@@ -35,6 +36,20 @@ pub struct Publisher {
     /// Whether results may still be put in place; held while one is.
     open: Mutex<bool>,
     _lock: File,
+}
+
+/// The folder of a result on its way into place; what is in it goes with this.
+#[derive(Debug)]
+pub struct Staged {
+    parent: tempfile::TempDir,
+    fresh: PathBuf,
+}
+
+impl Staged {
+    /// Where its files go.
+    pub fn folder(&self) -> &Path {
+        &self.fresh
+    }
 }
 
 /// Why nothing could be published.
@@ -105,6 +120,11 @@ impl Publisher {
         Ok(Self { out: out.to_owned(), staging: own, open: Mutex::new(true), _lock: lock })
     }
 
+    /// The output folder.
+    pub fn out(&self) -> &Path {
+        &self.out
+    }
+
     /// Where the result of the input with this name is published.
     pub fn target(&self, name: &Path) -> PathBuf {
         self.out.join(name)
@@ -127,15 +147,30 @@ impl Publisher {
         wanted: impl Fn() -> bool,
     ) -> Result<bool, PublishError> {
         self.admits(name)?;
-        let target = self.target(name);
+        let staged = self.room(name)?;
+        write_all(staged.folder(), files)?;
+        self.put(name, &staged, wanted)
+    }
+
+    /// Room for the files of the result of the input `name`, where they are not seen yet.
+    ///
+    /// # Errors
+    /// [`PublishError`] where it cannot be made.
+    pub fn room(&self, name: &Path) -> Result<Staged, PublishError> {
         let parent = tempfile::tempdir_in(self.staging()).map_err(at(self.staging()))?;
         let fresh = parent.path().join(name.file_name().unwrap_or_default());
         fs::create_dir(&fresh).map_err(at(&fresh))?;
-        for (file, bytes) in files {
-            let path = fresh.join(file);
-            write_synced(&path, bytes).map_err(at(&path))?;
-        }
-        sync_folder(&fresh).map_err(at(&fresh))?;
+        Ok(Staged { parent, fresh })
+    }
+
+    /// Puts files that are complete and on disk in the place of the result `name`, all at once, if it is still `wanted`
+    /// then. Whether they were.
+    ///
+    /// # Errors
+    /// [`PublishError`]; then an older result is untouched.
+    pub fn put(&self, name: &Path, staged: &Staged, wanted: impl Fn() -> bool) -> Result<bool, PublishError> {
+        let Staged { parent, fresh } = staged;
+        let target = self.target(name);
         // One at a time, of all processes, so that what is no longer wanted never takes the place of what came after it.
         // Nobody who closes is kept waiting by a lock.
         let is_wanted = || *self.open.lock() && wanted();
@@ -149,10 +184,10 @@ impl Publisher {
         // Writing took its time: somebody may have put something there.
         let own = self.admits(name)?;
         let folder = self.folder_for(name)?;
-        if keep_foreign(&target, &own, &fresh, false)? > 0 {
-            sync_folder(&fresh).map_err(at(&fresh))?;
+        if keep_foreign(&target, &own, fresh, false)? > 0 {
+            sync_folder(fresh).map_err(at(fresh))?;
         }
-        if let Some(older) = put_in_place(&fresh, &target, parent.path()).map_err(at(&target))? {
+        if let Some(older) = put_in_place(fresh, &target, parent.path()).map_err(at(&target))? {
             // Nothing is lost of what was put there in this moment, either: where it cannot be kept, the older comes back.
             let late = match fs::symlink_metadata(&older) {
                 Ok(m) if !m.is_dir() => Err(PublishError::Foreign(target.clone())),
@@ -246,6 +281,18 @@ fn pass_gate(out: &Path, wanted: impl Fn() -> bool) -> Result<Option<File>, Publ
     Ok(own::lock(&gate, &path, own::PATIENCE, wanted).map_err(at(&path))?.then_some(gate))
 }
 
+/// Writes the files of a result to `folder`, and brings them to disk.
+///
+/// # Errors
+/// [`PublishError`].
+pub fn write_all(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), PublishError> {
+    for (file, bytes) in files {
+        let path = folder.join(file);
+        write_synced(&path, bytes).map_err(at(&path))?;
+    }
+    sync_folder(folder).map_err(at(folder))
+}
+
 fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = File::create_new(path)?;
     file.write_all(bytes)?;
@@ -315,7 +362,10 @@ fn clear_stale(staging: &Path) {
         |e: &fs::DirEntry| e.file_type().is_ok_and(|t| t.is_dir()) && e.file_name().to_string_lossy().starts_with(RUN);
     for folder in entries.flatten().filter(is_run).map(|e| e.path()) {
         let removed = match own::lock_file_there(&folder, LOCK).map(|lock| lock.try_lock().is_ok()) {
-            Ok(true) => fs::remove_dir_all(&folder),
+            Ok(true) => {
+                begun::take_over(staging, &folder);
+                fs::remove_dir_all(&folder)
+            }
             Ok(false) => Ok(()),
             // Fails where something is in it.
             Err(_) => fs::remove_dir(&folder),

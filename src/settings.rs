@@ -45,6 +45,12 @@ pub struct Said {
     pub jobs: Option<usize>,
     /// Memory for inputs on their way and factorisations.
     pub memory: Option<ByteSize>,
+    /// The most memory that an input may take.
+    #[serde(rename = "job-memory")]
+    pub job_memory: Option<ByteSize>,
+    /// The most seconds that an input may take.
+    #[serde(rename = "job-time")]
+    pub job_time: Option<f64>,
     /// Look at the inbox regularly instead of being told by the system.
     pub poll: Option<bool>,
     /// Sub-folders of the inbox, too.
@@ -92,6 +98,12 @@ pub struct Settings {
     pub jobs: usize,
     /// Memory for inputs on their way and factorisations, in bytes.
     pub memory: u64,
+    /// The memory that there is for this process, in bytes: no input may take more.
+    pub machine_memory: u64,
+    /// The most memory that an input may take, in bytes; none: no limit but that of the machine.
+    pub job_memory: Option<u64>,
+    /// The most seconds (wall-clock) that an input may take; none: no limit.
+    pub job_time: Option<f64>,
     /// Look at the inbox regularly instead of being told by the system.
     pub poll: bool,
     /// Sub-folders of the inbox, too.
@@ -151,6 +163,12 @@ pub enum SettingsError {
     /// Too little to do anything.
     #[error("memory is {0}; it must be at least {LEAST_MEMORY}")]
     Memory(ByteSize),
+    /// Too little memory for any input.
+    #[error("job-memory is {0}; it must be at least {LEAST_JOB_MEMORY}")]
+    JobMemory(ByteSize),
+    /// No time.
+    #[error("job-time is {0}; it must be a positive number of seconds")]
+    JobTime(f64),
     /// A command cannot run.
     #[error("[[on_certified]], table {table}: {error}")]
     OnCertified {
@@ -183,19 +201,21 @@ const MOST_JOBS: usize = 1024;
 /// Less memory than this is a slip of the finger.
 const LEAST_MEMORY: ByteSize = ByteSize::mib(16);
 
+/// The stacks and buffers of an idle process take half of this.
+const LEAST_JOB_MEMORY: ByteSize = ByteSize::mib(64);
+
 /// The processors that this process may use.
 fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get).min(MOST_JOBS)
 }
 
-/// Half of the memory of the machine, or of the control group (the container) in which this process runs; a little,
-/// where the system does not tell.
-fn half_of_the_memory() -> ByteSize {
-    let Ok(mut system) = sysinfo::System::new() else { return ByteSize::gib(1) };
+/// The memory of the machine, or of the control group (the container) in which this process runs; a little, where the
+/// system does not tell.
+fn memory_of_the_machine() -> u64 {
+    let Ok(mut system) = sysinfo::System::new() else { return ByteSize::gib(2).as_u64() };
     system.refresh_memory();
     let of_group = system.cgroup_limits().map(|limits| limits.total_memory).filter(|total| *total > 0);
-    let total = of_group.map_or(system.total_memory(), |group| group.min(system.total_memory()));
-    ByteSize::b(total / 2).max(LEAST_MEMORY)
+    of_group.map_or(system.total_memory(), |group| group.min(system.total_memory()))
 }
 
 impl Said {
@@ -224,6 +244,8 @@ impl Said {
             force: self.force.or(other.force),
             jobs: self.jobs.or(other.jobs),
             memory: self.memory.or(other.memory),
+            job_memory: self.job_memory.or(other.job_memory),
+            job_time: self.job_time.or(other.job_time),
             poll: self.poll.or(other.poll),
             recursive: self.recursive.or(other.recursive),
             drain: self.drain.or(other.drain),
@@ -272,11 +294,18 @@ impl Said {
         if !(1..=MOST_JOBS).contains(&jobs) {
             return Err(SettingsError::Jobs(jobs));
         }
-        let memory = self.memory.unwrap_or_else(half_of_the_memory);
+        let machine_memory = memory_of_the_machine();
+        let memory = self.memory.unwrap_or_else(|| ByteSize::b(machine_memory / 2).max(LEAST_MEMORY));
         if memory < LEAST_MEMORY {
             return Err(SettingsError::Memory(memory));
         }
         let memory = memory.as_u64();
+        if let Some(memory) = self.job_memory.filter(|m| *m < LEAST_JOB_MEMORY) {
+            return Err(SettingsError::JobMemory(memory));
+        }
+        if let Some(seconds) = self.job_time.filter(|s| !(*s > 0.0 && s.is_finite())) {
+            return Err(SettingsError::JobTime(seconds));
+        }
         Ok(Settings {
             out: self.out,
             order,
@@ -290,6 +319,9 @@ impl Said {
             force: self.force.unwrap_or(false),
             jobs,
             memory,
+            machine_memory,
+            job_memory: self.job_memory.map(|memory| memory.as_u64()),
+            job_time: self.job_time,
             poll: self.poll.unwrap_or(false),
             recursive: self.recursive.unwrap_or(false),
             drain: self.drain.unwrap_or(false),

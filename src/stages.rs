@@ -5,9 +5,11 @@ use crate::hand_off;
 use crate::job::{Job, Stopped};
 use crate::look::Look;
 use crate::outcome::{Code, Reason, Status};
+use crate::passing;
 use crate::regular::{self, OpenError};
 use crate::report::{self, Decomposition, Output, Report};
 use crate::settings::{self, Settings};
+use bytesize::ByteSize;
 use pipeline::atlas::{Atlas, Chart};
 use pipeline::decompose::{self, split_ears};
 use pipeline::distortion::{self, CellFields};
@@ -19,8 +21,15 @@ use pipeline::{
     CertifiedChart, MapError, MappedChart, SplitError, finish_or_split, linear, map_or_split, repair, sparse,
 };
 use std::cell::RefCell;
+use std::fs::File;
+use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+
+/// What an input takes per triangle from reading to writing, factors apart, whatever its format: 1250 to 1500 bytes were
+/// measured for binary STL and PLY. No more than 430 of them are reached before the surface is cut into charts
+/// (`cargo run --release --example decode -- --cut`), so that readers do not count.
+pub const MEMORY_PER_TRIANGLE: u64 = 1500;
 
 /// The files of a result: names and contents.
 pub type Files = Vec<(String, Vec<u8>)>;
@@ -36,17 +45,53 @@ pub fn guard<T, E: From<Reason>>(work: impl FnOnce() -> Result<T, E>) -> Result<
     })
 }
 
+/// Why an input is not read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unread {
+    /// The reason.
+    pub reason: Reason,
+    /// Whether it says nothing about the input itself, and passes.
+    pub passes: bool,
+}
+
+impl From<OpenError> for Unread {
+    fn from(error: OpenError) -> Self {
+        let passes = matches!(&error, OpenError::Io(error) if passing::passes(error));
+        Self { reason: unreadable(error), passes }
+    }
+}
+
 /// Reads an input, as far as it is not too large. What is read is the file that was seen, whatever took its name since.
 ///
 /// # Errors
-/// The refusal.
-pub fn read_input(job: &Job, settings: &Settings) -> Result<Vec<u8>, Reason> {
-    let file = job.open().map_err(unreadable)?;
-    let is_seen = |seen: &Look| file.metadata().is_ok_and(|m| Look::of(&m) == *seen);
-    if !job.look.as_ref().is_none_or(is_seen) {
-        return Err(Reason::new(Code::Unreadable, "the file changed when it was opened; try again"));
+/// Why not.
+pub fn read_input(job: &Job, settings: &Settings) -> Result<Vec<u8>, Unread> {
+    Ok(regular::read(&open_input(job)?, settings.limits.file)?)
+}
+
+/// The hash of an input, and its size in bytes; as [`read_input`], but nothing of it is kept.
+///
+/// # Errors
+/// Why not.
+pub fn hash_input(job: &Job, settings: &Settings) -> Result<(blake3::Hash, u64), Unread> {
+    let (file, most) = (open_input(job)?, settings.limits.file);
+    let mut hasher = blake3::Hasher::new();
+    let read = hasher.update_reader(file.take(most.saturating_add(1))).map_err(OpenError::Io);
+    let size = read?.count();
+    if size > most {
+        return Err(OpenError::TooLarge { size, most }.into());
     }
-    regular::read(&file, settings.limits.file).map_err(unreadable)
+    Ok((hasher.finalize(), size))
+}
+
+fn open_input(job: &Job) -> Result<File, Unread> {
+    let file = job.open()?;
+    let is_seen = |seen: &Look| file.metadata().is_ok_and(|m| Look::of(&m) == *seen);
+    if job.look.as_ref().is_none_or(is_seen) {
+        return Ok(file);
+    }
+    let reason = Reason::new(Code::Unreadable, "the file changed when it was opened; try again");
+    Err(Unread { reason, passes: false })
 }
 
 /// Reads a regular file whole. Anything else (a folder, a pipe, a device) could block for ever.
@@ -102,6 +147,25 @@ pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -
             format!("the extension .{e} is not known; rename or convert the file to one of {READ}"),
         ),
     }
+}
+
+/// Whether there is the memory that a surface will take.
+///
+/// # Errors
+/// The refusal of one that takes more than an input may, or than there is.
+pub fn check_memory(soup: &TriangleSoup, settings: &Settings) -> Result<(), Reason> {
+    let needed = MEMORY_PER_TRIANGLE.saturating_mul(soup.triangles().len() as u64);
+    let (limit, remedy) = match settings.job_memory {
+        Some(limit) if limit <= settings.machine_memory => (limit, "raise job-memory"),
+        _ => (settings.machine_memory, "give the machine, or its container, more memory"),
+    };
+    if needed <= limit {
+        return Ok(());
+    }
+    let [needed, limit] = [needed, limit].map(ByteSize::b);
+    let message =
+        format!("it takes {needed} of memory or more, and there are {limit}: split or decimate it, or {remedy}");
+    Err(Reason::new(Code::JobMemory, message))
 }
 
 /// The folder of a file, and what was asked for in it.

@@ -4,6 +4,7 @@
 //! told by its lock on `OUT/.planish/watch.lock`, which the system takes back even where the daemon was killed.
 
 use crate::conveyor::board::Running;
+use crate::inbox::Notable;
 use crate::look::Identity;
 use crate::outcome::{Code, Status as Outcome};
 use crate::own;
@@ -14,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 /// The file whose lock the daemon holds.
 const LOCK_FILE: &str = "watch.lock";
@@ -50,6 +51,24 @@ pub struct Status {
     pub running: Vec<Progress>,
     /// Files that have not settled yet.
     pub unsettled: usize,
+    /// The first of those that are neither jobs nor done with, or not as they should be.
+    #[serde(default)]
+    pub notable: Vec<Noted>,
+    /// How many these are.
+    #[serde(default)]
+    pub notables: usize,
+    /// For how long the input has waited that has waited the longest for its result, in seconds; null: none waits.
+    #[serde(default)]
+    pub oldest: Option<f64>,
+    /// When this was told: seconds since 1970. It is told every ten seconds at least.
+    #[serde(default)]
+    pub told: u64,
+    /// When the last result was put in place: seconds since 1970; null: none since the start.
+    #[serde(default)]
+    pub last_published: Option<u64>,
+    /// The last thing that an operator must act on; null: none since the start.
+    #[serde(default)]
+    pub last_error: Option<Trouble>,
     /// What has ended since it began.
     pub ended: Counts,
     /// Log messages that were lost, because nobody took them off standard error.
@@ -70,6 +89,60 @@ pub struct Progress {
     pub charts: usize,
     /// For how long, in seconds.
     pub seconds: f64,
+    /// What keeps it from going on; null: nothing.
+    #[serde(default)]
+    pub trouble: Option<String>,
+}
+
+/// An input that is neither a job nor done with, or not as it should be.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Noted {
+    /// Its path below the inbox.
+    pub name: String,
+    /// `unsettled`: it changes still; `later`: it is tried again later; `waits`: for files beside it; `aside`: its result
+    /// cannot be put in its place.
+    pub state: String,
+    /// Why.
+    pub reason: String,
+    /// For how long it has been on its way, in seconds.
+    pub seconds: f64,
+}
+
+impl From<Notable<'_>> for Noted {
+    fn from(notable: Notable) -> Self {
+        Self {
+            name: notable.name.to_string_lossy().into_owned(),
+            state: notable.state.to_owned(),
+            reason: notable.reason.to_owned(),
+            seconds: tenths(notable.since.elapsed()),
+        }
+    }
+}
+
+/// What an operator must act on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Trouble {
+    /// When: seconds since 1970.
+    pub when: u64,
+    /// What is wrong, and what to do.
+    pub message: String,
+}
+
+impl Trouble {
+    /// Trouble that has come just now.
+    pub fn now(message: impl ToString) -> Self {
+        Self { when: now(), message: message.to_string() }
+    }
+}
+
+/// Seconds since 1970.
+pub fn now() -> u64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs())
+}
+
+/// Seconds, to a tenth.
+pub fn tenths(duration: Duration) -> f64 {
+    (duration.as_secs_f64() * 10.0).round() / 10.0
 }
 
 impl From<Running> for Progress {
@@ -79,7 +152,8 @@ impl From<Running> for Progress {
             stage: running.stage.name().to_owned(),
             charts_done: running.charts_done,
             charts: running.charts,
-            seconds: (running.since.elapsed().as_secs_f64() * 10.0).round() / 10.0,
+            seconds: tenths(running.since.elapsed()),
+            trouble: running.trouble,
         }
     }
 }
@@ -147,8 +221,22 @@ fn of_process(pid: &Option<u32>) -> String {
 /// The one daemon of an output folder.
 #[derive(Debug)]
 pub struct Lock {
-    status: PathBuf,
+    out: PathBuf,
+    identity: Identity,
     lock: File,
+}
+
+/// What became of the lock of a daemon.
+#[derive(Debug)]
+pub enum Held {
+    /// It is held.
+    Yes,
+    /// Somebody had removed it, and it was made and taken again.
+    Again,
+    /// The system does not tell at the moment.
+    Unknown(io::Error),
+    /// The output folder is gone or another one, or another daemon has it.
+    No,
 }
 
 impl Lock {
@@ -157,20 +245,49 @@ impl Lock {
     /// # Errors
     /// [`LockError`].
     pub fn take(out: &Path) -> Result<Self, LockError> {
-        let path = out.join(STAGING).join(LOCK_FILE);
-        let failed = |error| LockError::Io { path: path.clone(), error };
-        let lock = own::lock_file(&out.join(STAGING), LOCK_FILE).map_err(failed)?;
-        match own::lock(&lock, &path, ASKED, || true) {
-            Ok(true) => Ok(Self { status: out.join(STAGING).join(STATUS), lock }),
-            Ok(false) => Err(LockError::Busy { out: out.to_owned(), pid: told(out).map(|status| status.pid) }),
-            Err(error) => Err(failed(error)),
+        let failed = |error| LockError::Io { path: out.join(STAGING).join(LOCK_FILE), error };
+        let identity = fs::metadata(out).map(|m| Identity::of(&m)).map_err(failed)?;
+        match lock(out).map_err(failed)? {
+            Some(lock) => Ok(Self { out: out.to_owned(), identity, lock }),
+            None => Err(LockError::Busy { out: out.to_owned(), pid: told(out).map(|status| status.pid) }),
         }
     }
 
-    /// Whether the lock is still that of the output folder: somebody may have removed or replaced the folder.
-    pub fn is_held(&self) -> bool {
-        let there = fs::metadata(self.status.with_file_name(LOCK_FILE)).map(|m| Identity::of(&m));
-        there.is_ok_and(|there| self.lock.metadata().is_ok_and(|held| Identity::of(&held) == there))
+    /// Whether the lock is still that of the output folder: somebody may have removed or replaced either. Where only the
+    /// lock is gone, it is taken again.
+    pub fn hold(&mut self) -> Held {
+        let there = fs::metadata(self.path()).map(|m| Identity::of(&m));
+        let held = self.lock.metadata().map(|m| Identity::of(&m));
+        match (there, held) {
+            (Ok(there), Ok(held)) if there == held => Held::Yes,
+            (Ok(_), Ok(_)) => self.take_again(),
+            (Err(error), _) if is_gone(&error) => self.take_again(),
+            (Err(error), _) | (_, Err(error)) => Held::Unknown(error),
+        }
+    }
+
+    fn take_again(&mut self) -> Held {
+        match fs::metadata(&self.out).map(|m| Identity::of(&m)) {
+            Ok(identity) if identity == self.identity => {}
+            Err(error) if !is_gone(&error) => return Held::Unknown(error),
+            _ => return Held::No,
+        }
+        match own::folder(&self.out.join(STAGING)).and_then(|()| lock(&self.out)) {
+            Ok(Some(lock)) => {
+                self.lock = lock;
+                Held::Again
+            }
+            Ok(None) => Held::No,
+            Err(error) => Held::Unknown(error),
+        }
+    }
+
+    fn path(&self) -> PathBuf {
+        self.out.join(STAGING).join(LOCK_FILE)
+    }
+
+    fn status(&self) -> PathBuf {
+        self.out.join(STAGING).join(STATUS)
     }
 
     /// Tells what the daemon does.
@@ -181,15 +298,27 @@ impl Lock {
         // Whoever may read the results may read this: a temporary file would be its owner's alone.
         let fresh = staging.join("status.fresh");
         fs::write(&fresh, serde_json::to_vec(status)?)?;
-        fs::rename(fresh, &self.status)
+        fs::rename(fresh, self.status())
     }
 }
 
 impl Drop for Lock {
     fn drop(&mut self) {
         // It may never have been written.
-        let _ = fs::remove_file(&self.status);
+        let _ = fs::remove_file(self.status());
     }
+}
+
+/// Opens and takes the lock of an output folder; none: somebody else has it.
+fn lock(out: &Path) -> io::Result<Option<File>> {
+    let folder = out.join(STAGING);
+    let file = own::lock_file(&folder, LOCK_FILE)?;
+    Ok(own::lock(&file, &folder.join(LOCK_FILE), ASKED, || true)?.then_some(file))
+}
+
+/// Whether an error says that something is not there, rather than that nobody knows.
+fn is_gone(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
 }
 
 /// What the last daemon told; none: it ended in order, or there never was one.
@@ -225,8 +354,8 @@ mod tests {
         let staging = out.path().join(STAGING);
         fs::create_dir(&staging).expect("made");
         assert!(!is_running(out.path()));
-        let daemon = Lock::take(out.path()).expect("free");
-        assert!(is_running(out.path()) && daemon.is_held());
+        let mut daemon = Lock::take(out.path()).expect("free");
+        assert!(is_running(out.path()) && matches!(daemon.hold(), Held::Yes));
         let status = Status { pid: 42, waiting: 3, ..Status::default() };
         daemon.tell(&status, &staging).expect("written");
         assert_eq!(told(out.path()), Some(status));
@@ -242,5 +371,39 @@ mod tests {
         drop(daemon);
         assert!(!is_running(out.path()) && told(out.path()).is_none());
         Lock::take(out.path()).expect("free again");
+    }
+
+    #[test]
+    fn a_lock_that_somebody_removed_is_taken_again_and_one_of_another_folder_is_not() {
+        let place = tempfile::tempdir().expect("a folder");
+        let out = place.path().join("out");
+        fs::create_dir_all(out.join(STAGING)).expect("made");
+        let mut daemon = Lock::take(&out).expect("free");
+        fs::remove_dir_all(out.join(STAGING)).expect("removed");
+        assert!(matches!(daemon.hold(), Held::Again) && matches!(daemon.hold(), Held::Yes));
+        assert!(matches!(Lock::take(&out), Err(LockError::Busy { .. })));
+        fs::remove_file(out.join(STAGING).join(LOCK_FILE)).expect("removed");
+        let other = Lock::take(&out).expect("free, for another daemon");
+        assert!(matches!(daemon.hold(), Held::No), "that has it now");
+        drop(other);
+        fs::rename(&out, place.path().join("older")).expect("moved");
+        assert!(matches!(daemon.hold(), Held::No), "no folder");
+        fs::create_dir_all(out.join(STAGING)).expect("made");
+        assert!(matches!(daemon.hold(), Held::No), "another folder");
+        fs::remove_dir_all(&out).and_then(|()| fs::write(&out, "a file")).expect("written");
+        assert!(matches!(daemon.hold(), Held::No));
+    }
+
+    /// That the system does not tell is no reason to end: the folder may well be there.
+    #[test]
+    fn a_lock_that_cannot_be_looked_at_may_be_held() {
+        let place = tempfile::tempdir().expect("a folder");
+        let out = place.path().join("out");
+        fs::create_dir_all(out.join(STAGING)).expect("made");
+        let mut daemon = Lock::take(&out).expect("free");
+        // A path that leads round in circles says nothing about what it led to before.
+        fs::rename(&out, place.path().join("older")).expect("moved");
+        std::os::unix::fs::symlink("out", &out).expect("linked");
+        assert!(matches!(daemon.hold(), Held::Unknown(_)));
     }
 }

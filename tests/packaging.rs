@@ -46,6 +46,8 @@ fn the_example_works_as_it_is_and_switched_on_and_shows_the_defaults() {
         size: all.size,
         jobs: all.jobs,
         memory: all.memory,
+        job_memory: all.job_memory,
+        job_time: all.job_time,
         on_certified: all.on_certified.clone(),
         ..as_it_is
     };

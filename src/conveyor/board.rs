@@ -19,6 +19,8 @@ pub struct Running {
     pub charts: usize,
     /// When it was taken up.
     pub since: Instant,
+    /// What keeps it from going on, for people.
+    pub trouble: Option<String>,
 }
 
 /// All jobs on their way, in the order in which they were taken up.
@@ -38,7 +40,8 @@ impl Board {
         entries.taken_up += 1;
         let number = entries.taken_up;
         let (stage, since) = (Stage::Read, Instant::now());
-        entries.running.insert(number, Running { name: job.name.clone(), stage, charts_done: 0, charts: 0, since });
+        let name = job.name.clone();
+        entries.running.insert(number, Running { name, stage, charts_done: 0, charts: 0, since, trouble: None });
         number
     }
 

@@ -89,7 +89,7 @@ mod tests {
         for turn in 0..3 {
             let mesh = repair(&shapes::disk(2), &Default::default()).expect("a surface").mesh;
             let input = Input { name: "a.stl".to_owned(), bytes: None, blake3: None, beside: vec![] };
-            let surface = Surface::new(begin(&shared), mesh, 3, Report::new(input, &shared.settings));
+            let surface = Surface::new(begin(&shared), mesh, 3, Report::new(input, &shared.settings()));
             surface.expect(1);
             let mut order = places;
             order.rotate_left(turn);

@@ -1,33 +1,46 @@
 //! A job between the stages: what it has taken and must give back, whatever becomes of it.
 
 use super::board::Board;
-use super::budget::{Account, Budget};
+use super::budget::Account;
+use super::grants::Grants;
 use super::queue::{Queue, Turn, Waiting, belt};
-use super::turnstile::Turnstile;
+use super::writing::Sink;
+use crate::begun::{Begun, Entry, Suspect};
 use crate::formats::{self, Kind};
 use crate::job::{End, Job, Stage, Stopped};
-use crate::publish::Publisher;
 use crate::settings::Settings;
 use crate::shown::shown;
-use crate::stages::guard;
+use crate::stages::{self, guard};
 use crossbeam_channel::Sender;
-use parking_lot::Mutex;
+use parking_lot::{Mutex, RwLock};
 use pipeline::host::Host;
 use rustix::time::{ClockId, clock_gettime};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tracing::Span;
 
 /// What all threads share.
 pub(super) struct Shared {
-    pub settings: Settings,
-    pub publisher: Arc<Publisher>,
+    /// Those of inputs that are taken up from now on.
+    pub settings: RwLock<Arc<Settings>>,
+    pub sink: Sink,
+    /// None in the process of a single job: its parent marks it.
+    pub begun: Option<Begun>,
+    /// Whether results are kept that cannot be written now.
+    pub is_patient: bool,
     pub queue: Queue,
-    pub turnstile: Turnstile,
-    pub budget: Budget,
+    pub grants: Arc<dyn Grants>,
     pub board: Board,
     pub ended: Sender<Ended>,
+}
+
+impl Shared {
+    /// The settings as they are now.
+    pub fn settings(&self) -> Arc<Settings> {
+        self.settings.read().clone()
+    }
 }
 
 /// A job that has ended.
@@ -45,22 +58,23 @@ pub(super) struct Travel {
     pub shared: Arc<Shared>,
     pub job: Arc<Job>,
     pub number: u64,
-    turn: Turn,
+    /// The settings that were in force when it was taken up.
+    pub settings: Arc<Settings>,
+    /// Its place in the order of jobs.
+    pub turn: Turn,
+    suspect: Mutex<Option<Suspect>>,
+    /// What was foretold that it takes, in bytes.
+    foretold: u64,
     memory: AtomicU64,
     span: Span,
     seconds: Mutex<BTreeMap<&'static str, f64>>,
     end: Mutex<Option<End>>,
 }
 
-/// What an input takes per triangle from reading to writing, factors apart, whatever its format: 1250 to 1500 bytes were
-/// measured for binary STL and PLY. No more than 430 of them are reached before the surface is cut into charts
-/// (`cargo run --release --example decode -- --cut`), so that readers do not count.
-const MEMORY_PER_TRIANGLE: u64 = 1500;
-
 /// What an input takes from reading to writing, by its size and format. What is no mesh is only looked at.
 fn memory(job: &Job) -> u64 {
     match formats::kind(&job.path) {
-        Kind::Mesh(format) => (job.bytes / format.bytes_per_triangle()).saturating_mul(MEMORY_PER_TRIANGLE),
+        Kind::Mesh(format) => (job.bytes / format.bytes_per_triangle()).saturating_mul(stages::MEMORY_PER_TRIANGLE),
         Kind::OtherMesh(_) | Kind::NoMesh | Kind::Unknown(_) => job.bytes,
     }
 }
@@ -69,12 +83,57 @@ impl Travel {
     /// Takes a job up, once there is memory for its data.
     pub fn begin(shared: &Arc<Shared>, Waiting { job, turn }: Waiting) -> Arc<Self> {
         let number = shared.board.add(&job);
-        let memory = if job.is_wanted() { memory(&job) } else { 0 };
-        shared.budget.take(Account::Input(belt(job.bytes)), memory, turn);
+        let is_to_be_done = job.is_wanted() && job.doubted.is_none();
+        let foretold = if is_to_be_done { memory(&job) } else { 0 };
+        shared.grants.take(Account::Input(belt(job.bytes)), foretold, turn);
         let span = tracing::info_span!("job", input = shown(&job.name));
-        span.in_scope(|| tracing::info!("begins"));
-        let (memory, seconds, end) = (memory.into(), Mutex::default(), Mutex::new(None));
-        Arc::new(Self { shared: shared.clone(), job, number, turn, memory, span, seconds, end })
+        let suspect = Mutex::new(span.in_scope(|| begin(shared, &job)));
+        let (settings, memory) = (shared.settings(), foretold.into());
+        let (shared, seconds, end) = (shared.clone(), Mutex::default(), Mutex::new(None));
+        Arc::new(Self { shared, job, number, settings, turn, suspect, foretold, memory, span, seconds, end })
+    }
+
+    /// What it takes from reading to writing, factors apart, as it was foretold by its size: in bytes.
+    pub fn foretold(&self) -> u64 {
+        self.foretold
+    }
+
+    /// How often a process has died while it was on its way.
+    pub fn deaths(&self) -> u32 {
+        self.suspect.lock().as_ref().map_or(0, Suspect::deaths)
+    }
+
+    /// Marks it as on its way in this process.
+    pub fn mark(&self) {
+        let marked = self.suspect.lock().as_mut().map_or(Ok(()), Suspect::begin);
+        if let Err(error) = marked {
+            self.span.in_scope(|| tracing::debug!("that it is on its way cannot be noted down: {error}"));
+        }
+    }
+
+    /// The mark for a process of its own: where, and what it says.
+    pub fn mark_apart(&self) -> Option<(PathBuf, Entry)> {
+        let suspect = self.suspect.lock();
+        let (path, entry) = suspect.as_ref()?.mark();
+        Some((path.to_owned(), entry.clone()))
+    }
+
+    /// One more process has died of it; how many that are.
+    pub fn count_death(&self) -> u32 {
+        let mut suspect = self.suspect.lock();
+        // Only a process of its own has none, and that starts no other.
+        let Some(suspect) = suspect.as_mut() else { return u32::MAX };
+        if let Err(error) = suspect.count_death() {
+            self.span.in_scope(|| tracing::warn!("that a process died of it cannot be noted down: {error}"));
+        }
+        suspect.deaths()
+    }
+
+    /// It has come to its end, and nothing died of it.
+    pub fn acquit(&self) {
+        if let Some(suspect) = self.suspect.lock().as_mut().filter(|suspect| suspect.deaths() > 0) {
+            suspect.acquit();
+        }
     }
 
     /// Does the work of a stage: in its turn, its processor time booked. A panic is a failure of the job; what comes
@@ -99,6 +158,19 @@ impl Travel {
         self.shared.board.update(self.number, |job| job.stage = job.stage.max(stage));
     }
 
+    /// Tells how far a process of its own has come with it.
+    pub fn is_at(&self, stage: Stage, charts_done: usize, charts: usize) {
+        self.shared.board.update(self.number, |job| {
+            job.stage = job.stage.max(stage);
+            (job.charts_done, job.charts) = (charts_done, charts);
+        });
+    }
+
+    /// Tells what keeps it from going on.
+    pub fn is_in_trouble(&self, trouble: Option<String>) {
+        self.shared.board.update(self.number, |job| job.trouble = trouble);
+    }
+
     /// The processor time of all stages so far. Milliseconds are enough, and read well.
     pub fn timing(&self) -> BTreeMap<String, f64> {
         let seconds = self.seconds.lock();
@@ -107,7 +179,7 @@ impl Travel {
 
     /// The data of the input is gone: others may take its memory.
     pub fn give_memory_back(&self) {
-        self.shared.budget.give_back(Account::Input(belt(self.job.bytes)), self.memory.swap(0, Ordering::Relaxed));
+        self.shared.grants.give_back(Account::Input(belt(self.job.bytes)), self.memory.swap(0, Ordering::Relaxed));
     }
 
     /// How the job ended.
@@ -127,19 +199,27 @@ impl Drop for Travel {
     }
 }
 
+/// Tells that a job begins; what is known of its input.
+fn begin(shared: &Shared, job: &Job) -> Option<Suspect> {
+    // The parent of a process of its own has done both.
+    let begun = shared.begun.as_ref().filter(|_| job.doubted.is_none())?;
+    tracing::info!("begins");
+    Some(begun.about(&job.name, job.look))
+}
+
 /// A place inside the turnstile.
 struct Seat<'a>(&'a Travel);
 
 impl<'a> Seat<'a> {
     fn take(travel: &'a Travel) -> Self {
-        travel.shared.turnstile.enter(travel.turn);
+        travel.shared.grants.enter(travel.turn);
         Self(travel)
     }
 }
 
 impl Drop for Seat<'_> {
     fn drop(&mut self) {
-        self.0.shared.turnstile.leave();
+        self.0.shared.grants.leave();
     }
 }
 
@@ -147,7 +227,7 @@ impl Host for Seat<'_> {
     fn go_on(&self) -> bool {
         let Travel { shared, turn, job, .. } = self.0;
         if job.is_wanted() {
-            shared.turnstile.let_pass(*turn);
+            shared.grants.let_pass(*turn);
         }
         job.is_wanted()
     }
@@ -155,17 +235,17 @@ impl Host for Seat<'_> {
     fn reserve(&self, bytes: u64) {
         let Travel { shared, turn, job, .. } = self.0;
         if !job.is_wanted() {
-            shared.budget.overdraw(Account::Factor, bytes);
-        } else if !shared.budget.try_take(Account::Factor, bytes) {
+            shared.grants.overdraw(Account::Factor, bytes);
+        } else if !shared.grants.try_take(Account::Factor, bytes) {
             tracing::debug!(bytes, "waits for memory");
-            shared.turnstile.leave();
-            shared.budget.take(Account::Factor, bytes, *turn);
-            shared.turnstile.enter(*turn);
+            shared.grants.leave();
+            shared.grants.take(Account::Factor, bytes, *turn);
+            shared.grants.enter(*turn);
         }
     }
 
     fn release(&self, bytes: u64) {
-        self.0.shared.budget.give_back(Account::Factor, bytes);
+        self.0.shared.grants.give_back(Account::Factor, bytes);
     }
 }
 
@@ -178,7 +258,9 @@ fn cpu_seconds() -> f64 {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::conveyor::grants::Own;
     use crate::outcome::Code;
+    use crate::publish::Publisher;
     use crate::settings::Said;
     use crossbeam_channel::{Receiver, bounded};
 
@@ -187,11 +269,12 @@ pub(super) mod tests {
         let out = tempfile::tempdir().expect("a folder");
         let (ended, to_tell) = bounded(8);
         let shared = Shared {
-            settings: Said::default().check().expect("in range"),
-            publisher: Arc::new(Publisher::open(out.path()).expect("opens")),
+            settings: RwLock::new(Arc::new(Said::default().check().expect("in range"))),
+            sink: Sink::Out(Arc::new(Publisher::open(out.path()).expect("opens"))),
+            begun: None,
+            is_patient: false,
             queue: Queue::default(),
-            turnstile: Turnstile::new(1),
-            budget: Budget::new(memory),
+            grants: Arc::new(Own::new(1, memory)),
             board: Board::default(),
             ended,
         };
@@ -221,12 +304,12 @@ pub(super) mod tests {
         assert!(matches!(stopped, Err(Stopped::For(reason)) if reason.code == Code::Internal));
         // Place and memory are free again; and nobody told how the job ended.
         assert_eq!(travel.compute(Stage::Map, |_| Ok(7)), Ok(7));
-        assert!(shared.budget.try_take(Account::Factor, 1 << 19));
+        assert!(shared.grants.try_take(Account::Factor, 1 << 19));
         drop(travel);
         assert!(matches!(ended.try_recv().expect("told").end, End::Lost));
         assert!(ended.try_recv().is_err() && shared.board.running().is_empty());
-        shared.budget.give_back(Account::Factor, 1 << 19);
-        assert!(shared.budget.try_take(Account::Input(0), 1 << 20), "the memory for its data, too");
+        shared.grants.give_back(Account::Factor, 1 << 19);
+        assert!(shared.grants.try_take(Account::Input(0), 1 << 20), "the memory for its data, too");
     }
 
     #[test]

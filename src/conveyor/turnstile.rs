@@ -59,9 +59,14 @@ impl Turnstile {
         self.moved.notify_all();
     }
 
+    /// Whether somebody ahead of `turn` waits: a hint.
+    pub fn is_waited_for(&self, turn: Turn) -> bool {
+        self.ahead.load(Ordering::Relaxed) < turn
+    }
+
     /// Called from inside: lets those ahead of `turn` pass.
     pub fn let_pass(&self, turn: Turn) {
-        if self.ahead.load(Ordering::Relaxed) < turn {
+        if self.is_waited_for(turn) {
             // In one step, so that none of those behind slips in before.
             let mut state = self.state.lock();
             state.free += 1;

@@ -41,7 +41,7 @@ impl Beside for Nothing {
 }
 
 /// What is too much for one input. Files may come from anyone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Limits {
     /// Bytes of the file, and of all that it takes along.
     pub file: u64,
@@ -51,11 +51,19 @@ pub struct Limits {
     pub expansion: u64,
     /// Levels of nested nodes, groups, elements.
     pub depth: usize,
+    /// Bytes of the files of its result together.
+    pub result: u64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { file: 2 << 30, elements: TriangleSoup::MAX_TRIANGLES as u64, expansion: 100, depth: 256 }
+        Self {
+            file: 2 << 30,
+            elements: TriangleSoup::MAX_TRIANGLES as u64,
+            expansion: 100,
+            depth: 256,
+            result: 16 << 30,
+        }
     }
 }
 

@@ -111,6 +111,23 @@ impl From<&Settings> for ResultSettings {
     }
 }
 
+impl ResultSettings {
+    /// These, and all others as they are in `settings`.
+    pub fn applied_to(&self, settings: Settings) -> Settings {
+        Settings {
+            order: if self.order == 1 { Order::Linear } else { Order::Quadratic },
+            weld: self.weld,
+            feature_angle: self.feature_angle,
+            strict_disks: self.strict_disks,
+            max_area_ratio: self.max_area_ratio,
+            max_triangles: self.max_triangles,
+            hand_off: self.hand_off,
+            size: self.size,
+            ..settings
+        }
+    }
+}
+
 /// A surface before and after repair.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Surface {

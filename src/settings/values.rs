@@ -123,6 +123,8 @@ pub struct LimitsSaid {
     pub expansion: Option<u64>,
     /// Levels of nesting.
     pub depth: Option<usize>,
+    /// The size of all files of a result together.
+    pub result: Option<ByteSize>,
 }
 
 impl LimitsSaid {
@@ -134,6 +136,7 @@ impl LimitsSaid {
             elements: self.elements.unwrap_or(usual.elements),
             expansion: self.expansion.unwrap_or(usual.expansion),
             depth: self.depth.unwrap_or(usual.depth),
+            result: self.result.map_or(usual.result, |size| size.as_u64()),
         }
     }
 }

@@ -46,7 +46,12 @@ fn answer(job: &Job, settings: &Settings) -> Answer {
     let input = job.path.to_string_lossy().into_owned();
     let mut content = None;
     let found = guard(|| {
-        let found = decode(&job.path, &read_input(job, settings)?, settings, &Folder::of_job(job));
+        let found = decode(
+            &job.path,
+            &read_input(job, settings).map_err(|unread| unread.reason)?,
+            settings,
+            &Folder::of_job(job),
+        );
         let Content { soup, notes } = found.map_err(|refusal| {
             content = refusal.notes.map(|notes| *notes);
             refusal.reason

@@ -3,6 +3,7 @@
 pub mod check;
 pub mod check_mesh;
 pub mod info;
+pub mod job;
 pub mod run;
 pub mod status;
 pub mod watch;

@@ -31,7 +31,7 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     inputs::refuse_inside(&jobs, out)?;
     let publisher = Arc::new(Publisher::open(out)?);
     let stop = signals::listen()?;
-    let conveyor = Conveyor::start(settings, publisher.clone()).map_err(|e| super::no_threads(&e))?;
+    let conveyor = Conveyor::start(settings, publisher.clone(), false).map_err(|e| super::no_threads(&e))?;
     let jobs: Vec<Arc<Job>> = jobs.into_iter().map(Arc::new).collect();
     jobs.iter().for_each(|job| conveyor.submit(job.clone()));
     conveyor.close();
@@ -151,14 +151,14 @@ fn tell_trouble(job: &Job, end: &End) {
         End::Unwritten(error) => complain(&format!("{input}: {error}")),
         End::Unchained(_, error) => complain(&format!("{input}: certified, but {error}")),
         End::Changed => complain(&format!("{input}: it changed while it was read; try again")),
-        End::Waiting(reason) => complain(&format!("{input}: {}", reason.message)),
+        End::Waiting(reason) | End::Again(reason) => complain(&format!("{input}: {}", reason.message)),
         End::Lost => complain(&format!("{input}: planish broke down; that is a fault of planish: please report it")),
         End::Done(Done { report: Report { reason: Some(reason), status, .. }, .. }) => {
             let untold = reason.place.as_ref().filter(|place| !reason.message.contains(place.as_str()));
             let place = untold.map_or(String::new(), |place| format!(" ({place})"));
             complain(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
         }
-        End::Done(_) | End::Later(..) | End::Outdated(_) | End::Unwanted => {}
+        End::Done(_) | End::Later(..) | End::Outdated(_) | End::Unwanted | End::Same => {}
     }
 }
 

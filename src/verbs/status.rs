@@ -4,7 +4,7 @@ use super::{Exit, say, say_json, shown};
 use crate::ledger;
 use crate::outcome::Status as Outcome;
 use crate::settings::Settings;
-use crate::status::{self, Counts, Progress, Refusal, Status};
+use crate::status::{self, Counts, Noted, Progress, Refusal, Status};
 use serde::Serialize;
 use std::path::Path;
 
@@ -66,6 +66,9 @@ fn text(answer: &Answer) -> String {
         lines.extend(daemon.running.iter().map(progress));
         lines.extend(daemon.next.iter().take(NAMED).map(|name| format!("  {:12} {}", "waits", plain(name))));
         lines.extend((daemon.waiting > NAMED).then(|| format!("  and {} more", daemon.waiting - NAMED)));
+        lines.extend(daemon.notable.iter().take(NAMED).map(noted));
+        let more = daemon.notables.saturating_sub(NAMED);
+        lines.extend((more > 0).then(|| format!("  and {more} more that are not done")));
     }
     let Counts { certified, refused, failed } = answer.results;
     lines.push(format!("results: {certified} certified, {refused} refused, {failed} failed"));
@@ -91,7 +94,12 @@ fn headline(answer: &Answer) -> String {
 
 fn progress(job: &Progress) -> String {
     let charts = if job.charts > 0 { format!("{} of {} charts, ", job.charts_done, job.charts) } else { String::new() };
-    format!("  {:12} {}: {charts}{:.1} s", job.stage, plain(&job.name), job.seconds)
+    let trouble = job.trouble.as_ref().map_or(String::new(), |trouble| format!(": {}", plain(trouble)));
+    format!("  {:12} {}: {charts}{:.1} s{trouble}", job.stage, plain(&job.name), job.seconds)
+}
+
+fn noted(input: &Noted) -> String {
+    format!("  {:12} {}: {} ({:.0} s)", input.state, plain(&input.name), plain(&input.reason), input.seconds)
 }
 
 fn refusal(refusal: &Refusal) -> String {

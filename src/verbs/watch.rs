@@ -24,15 +24,15 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
         holding::try_out(inbox)?;
     }
     let publisher = Arc::new(Publisher::open(out)?);
-    let lock = Lock::take(out)?;
+    let mut lock = Lock::take(out)?;
     holding::recover(inbox, settings.recursive);
     if let Inputs::Move(folder) = &settings.inputs {
         holding::clear(folder, settings.recursive);
     }
     let stop = signals::listen()?;
-    let conveyor = Conveyor::start(settings, publisher.clone()).map_err(|e| super::no_threads(&e))?;
+    let conveyor = Conveyor::start(settings, publisher.clone(), true).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
-    let ended = Daemon::new(inbox, settings, &conveyor, (&lock, publisher.staging())).run(&stop)?;
+    let ended = Daemon::new(inbox, settings, &conveyor, (&mut lock, &publisher)).run(&stop)?;
     // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more.
     publisher.close();
     tracing::info!(certified = ended.certified, refused = ended.refused, failed = ended.failed, "stopped");

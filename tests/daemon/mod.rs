@@ -2,6 +2,8 @@
 
 mod chaining;
 mod dropping;
+mod enduring;
+mod isolating;
 mod killing;
 mod many;
 mod putting_away;
@@ -13,6 +15,7 @@ use planish::report::Output;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::collections::BTreeSet;
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -66,11 +69,22 @@ impl Watched {
 
     /// `planish watch` with its log in a file.
     fn command(&self) -> Command {
-        let log = File::options().create(true).append(true).open(self.beside("log")).expect("a log");
         let mut command = Command::new(env!("CARGO_BIN_EXE_planish"));
-        command.arg("watch").arg(self.inbox()).arg("--out").arg(self.out.path()).args(["--log", "json"]);
-        command.args(&self.args).stderr(log);
+        command.args(self.arguments()).stderr(self.log_file());
         command
+    }
+
+    /// The arguments of `planish`.
+    pub fn arguments(&self) -> Vec<OsString> {
+        let (inbox, out) = (self.inbox(), self.out.path());
+        let head: [&OsStr; 6] =
+            ["watch".as_ref(), inbox.as_ref(), "--out".as_ref(), out.as_ref(), "--log".as_ref(), "json".as_ref()];
+        head.into_iter().map(OsStr::to_owned).chain(self.args.iter().map(OsString::from)).collect()
+    }
+
+    /// Where the daemon says what it does.
+    pub fn log_file(&self) -> File {
+        File::options().create(true).append(true).open(self.beside("log")).expect("a log")
     }
 
     pub fn start(&mut self) {
@@ -142,7 +156,7 @@ impl Watched {
     }
 
     /// Waits until something is so.
-    pub fn wait_until(&self, what: &str, is_so: impl Fn(&Self) -> bool) {
+    pub fn wait_until(&self, what: &str, mut is_so: impl FnMut(&Self) -> bool) {
         let since = Instant::now();
         while !is_so(self) {
             assert!(since.elapsed() < PATIENCE, "waited in vain until {what}\n{}", self.log());

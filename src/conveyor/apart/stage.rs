@@ -1,0 +1,120 @@
+//! The stage that has inputs done by processes of their own.
+
+use super::protocol::Ending;
+use super::{Death, Outcome, run};
+use crate::begun::MOST_DEATHS;
+use crate::conveyor::travel::Travel;
+use crate::conveyor::writing::{self, After, Made, Ready};
+use crate::conveyor::{Finished, hand_on, reading, unwritten};
+use crate::job::{End, Stage};
+use crate::outcome::{Code, Reason};
+use crate::publish::Staged;
+use crate::report::{self, Report};
+use crate::stages;
+use blake3::Hash;
+use bytesize::ByteSize;
+use crossbeam_channel::Sender;
+use std::sync::Arc;
+
+/// What gets a process of its own.
+pub(in crate::conveyor) struct Apart {
+    pub travel: Arc<Travel>,
+    pub report: Report,
+    /// The hash of its content.
+    pub hash: Hash,
+}
+
+/// How an attempt ended that brought no result.
+enum Tried {
+    Died(Death),
+    Refused(Reason),
+}
+
+/// Has an input done by a process of its own: once more, where that dies.
+pub(in crate::conveyor) fn do_apart(
+    Apart { travel, mut report, hash }: Apart,
+    finished: &Sender<Finished>,
+    after: &After,
+) {
+    let ended = loop {
+        match try_apart(&travel, hash, after) {
+            // Ends: deaths are counted.
+            Some(Tried::Died(death)) if travel.count_death() < MOST_DEATHS && travel.job.is_wanted() => {
+                let _in_stage = travel.in_stage(Stage::Read);
+                tracing::warn!("its process died ({death}): it is tried once more");
+            }
+            tried => break tried,
+        }
+    };
+    let why = match ended {
+        None => return,
+        Some(Tried::Died(death)) => reading::crashed(&death.to_string()),
+        Some(Tried::Refused(reason)) => reason,
+    };
+    report.timing = travel.timing();
+    hand_on(finished, Finished::Stopped(travel, Box::new(report), why.into()));
+}
+
+/// Has an input done by a process of its own; none: its end is told, or its result on its way.
+fn try_apart(travel: &Arc<Travel>, hash: Hash, after: &After) -> Option<Tried> {
+    let publisher = travel.shared.sink.publisher()?;
+    let staged = match publisher.room(&travel.job.name) {
+        Ok(staged) => staged,
+        Err(error) => {
+            unwritten(travel, error);
+            return None;
+        }
+    };
+    match run(travel, staged.folder()) {
+        Ok(Outcome::Ended(ending)) => end(travel, ending, staged, hash, after),
+        Ok(Outcome::Died(death)) => return Some(of_death(travel, death)),
+        Ok(Outcome::OutOfTime) => return Some(Tried::Refused(out_of_time(travel))),
+        Ok(Outcome::Unwanted) => travel.end(End::Unwanted),
+        Err(error) => {
+            let message = format!("no process can be started for it: {error}");
+            reading::again(travel, Reason::new(Code::Unreadable, message));
+        }
+    }
+    None
+}
+
+fn end(travel: &Arc<Travel>, ending: Ending, staged: Staged, hash: Hash, after: &After) {
+    travel.acquit();
+    match ending {
+        Ending::Made => put(travel, staged, hash, after),
+        Ending::Changed => travel.end(End::Changed),
+        Ending::Waiting(reason) => travel.end(End::Waiting(reason)),
+        Ending::Again(reason) => reading::again(travel, reason),
+        Ending::Lost => travel.end(End::Lost),
+    }
+}
+
+/// Puts in place what the process of an input has made, if it is of the content that was hashed.
+fn put(travel: &Arc<Travel>, staged: Staged, hash: Hash, after: &After) {
+    let text = stages::read_file(&staged.folder().join(report::FILE)).ok();
+    let report: Option<Report> = text.and_then(|text| serde_json::from_slice(&text).ok());
+    match report {
+        Some(report) if report.input.blake3.as_deref() == Some(hash.to_hex().as_str()) => {
+            writing::put(Ready { travel: travel.clone(), report, content: Made::Staged(staged) }, after);
+        }
+        Some(_) => travel.end(End::Changed),
+        None => travel.end(End::Lost),
+    }
+}
+
+fn out_of_time(travel: &Travel) -> Reason {
+    let limit = travel.settings.job_time.unwrap_or_default();
+    let message = format!("it takes longer than {limit} s: split or decimate it, or raise job-time");
+    Reason::new(Code::JobTime, message)
+}
+
+/// What a death says: where memory was limited, and it died for that, it is no accident.
+fn of_death(travel: &Travel, death: Death) -> Tried {
+    match travel.settings.job_memory.map(ByteSize::b) {
+        Some(limit) if death.is_for_memory() => {
+            let message = format!("it takes more memory than {limit}: split or decimate it, or raise job-memory");
+            Tried::Refused(Reason::new(Code::JobMemory, message))
+        }
+        _ => Tried::Died(death),
+    }
+}

@@ -1,0 +1,207 @@
+//! Putting results in their place, and trying again where the system gets in the way for a while.
+
+use super::travel::Travel;
+use super::{Chained, Finished, log, published, unwritten};
+use crate::job::{Done, End, Stage, Stopped};
+use crate::outcome::{Code, Reason};
+use crate::passing;
+use crate::publish::{self, PublishError, Publisher, Staged};
+use crate::report::{self, Report};
+use crate::stages::{self, Files};
+use bytesize::ByteSize;
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Results that could not be written are looked after this often.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Where results go.
+pub(super) enum Sink {
+    /// To the output folder.
+    Out(Arc<Publisher>),
+    /// To a folder, for a parent that puts them in place.
+    Folder(PathBuf),
+}
+
+impl Sink {
+    /// What publishes, in a process that does.
+    pub fn publisher(&self) -> Option<&Publisher> {
+        if let Self::Out(publisher) = self { Some(publisher) } else { None }
+    }
+}
+
+/// A result, ready to be put in place.
+pub(super) struct Ready {
+    pub travel: Arc<Travel>,
+    pub report: Report,
+    pub content: Made,
+}
+
+impl Ready {
+    /// Whether its files are still there: somebody may have removed those on disk.
+    fn is_there(&self) -> bool {
+        match &self.content {
+            Made::Files(_) => true,
+            Made::Staged(staged) => staged.folder().exists(),
+        }
+    }
+}
+
+/// The files of a result.
+pub(super) enum Made {
+    /// In memory.
+    Files(Files),
+    /// On disk.
+    Staged(Staged),
+}
+
+/// Where a result goes that is written, and one that is not.
+pub(super) struct After {
+    pub chain: Sender<Chained>,
+    pub parked: Sender<Ready>,
+}
+
+/// Puts the charts of a surface together, and puts its result in place.
+pub(super) fn write(finished: Finished, after: &After) {
+    let (travel, mut report, files) = match finished {
+        Finished::Stopped(travel, report, why) => (travel, *report, Err(why)),
+        Finished::Surface(surface) => {
+            let (mut report, done) = surface.collect();
+            let travel = surface.travel.clone();
+            let assembled = travel.compute(Stage::Write, |_| {
+                Ok(stages::assemble(&surface.mesh, done?, surface.whole, &travel.settings, &mut report)?)
+            });
+            (travel, report, assembled)
+        }
+    };
+    let mut files = match files.and_then(|files| Ok(not_too_large(files, &travel)?)) {
+        Ok(files) => files,
+        Err(Stopped::Unwanted) => return travel.end(End::Unwanted),
+        Err(Stopped::For(reason)) => {
+            refuse(&mut report, reason);
+            Files::new()
+        }
+    };
+    report.timing = travel.timing();
+    match report.to_json() {
+        Ok(text) => {
+            files.push((report::FILE.to_owned(), text));
+            put(Ready { travel, report, content: Made::Files(files) }, after);
+        }
+        Err(error) => {
+            let _in_stage = travel.in_stage(Stage::Write);
+            unwritten(&travel, PublishError::Report(error));
+        }
+    }
+}
+
+/// The files, unless they are too large together.
+fn not_too_large(files: Files, travel: &Travel) -> Result<Files, Reason> {
+    let (bytes, most) = (files.iter().map(|(_, content)| content.len() as u64).sum(), travel.settings.limits.result);
+    if bytes <= most {
+        return Ok(files);
+    }
+    let [bytes, most] = [bytes, most].map(ByteSize::b);
+    Err(Reason::new(
+        Code::TooLarge,
+        format!(
+            "its result has {bytes}, more than {most}: decimate it, or raise `result` in the table [limits] of \
+             planish.toml"
+        ),
+    ))
+}
+
+/// The report of an input that is refused, or failed.
+fn refuse(report: &mut Report, reason: Reason) {
+    report.status = reason.status();
+    // What a stage that broke down left in it is not to be trusted, nor that of a result that is not written.
+    report.charts.clear();
+    report.outputs.clear();
+    report.hand_off = None;
+    report.reason = Some(reason);
+}
+
+/// Puts a result in place, or keeps it for later.
+pub(super) fn put(mut ready: Ready, after: &After) {
+    let travel = ready.travel.clone();
+    let _in_stage = travel.in_stage(Stage::Write);
+    match try_to_put(&mut ready) {
+        Err(error) if travel.shared.is_patient && ready.is_there() && !error.is_lasting() => {
+            tracing::error!("the result is kept, and put in place as soon as that can be: {error}");
+            travel.is_in_trouble(Some(error.to_string()));
+            super::hand_on(&after.parked, ready);
+        }
+        ended => end(ready, ended, &after.chain),
+    }
+}
+
+fn end(ready: Ready, ended: Result<bool, PublishError>, chain: &Sender<Chained>) {
+    let Ready { travel, report, .. } = ready;
+    match ended {
+        Ok(true) => {
+            if travel.shared.sink.publisher().is_some() {
+                log(&report);
+            }
+            published(travel, Done { report, up_to_date: false }, chain);
+        }
+        Ok(false) => travel.end(if travel.job.is_wanted() { End::Changed } else { End::Unwanted }),
+        Err(error) => unwritten(&travel, error),
+    }
+}
+
+fn try_to_put(ready: &mut Ready) -> Result<bool, PublishError> {
+    let Ready { travel, content, .. } = ready;
+    let wanted = || travel.job.is_wanted() && travel.job.is_unchanged();
+    let publisher = match &travel.shared.sink {
+        Sink::Out(publisher) => publisher,
+        Sink::Folder(folder) => {
+            let Made::Files(files) = content else { return Ok(false) };
+            return publish::write_all(folder, files).map(|()| true);
+        }
+    };
+    match content {
+        Made::Files(files) => publisher.publish(&travel.job.name, files, wanted),
+        Made::Staged(staged) => publisher.put(&travel.job.name, staged, wanted),
+    }
+}
+
+/// Tries again to put results in place, in steps that grow, until nobody wants them or no more come.
+pub(super) fn look_after(parked: Receiver<Ready>, chain: &Sender<Chained>) {
+    let mut waiting: Vec<(Ready, u32, Instant)> = Vec::new();
+    loop {
+        match parked.recv_timeout(LOOK) {
+            Ok(ready) => waiting.push((ready, 1, Instant::now() + passing::pause(1))),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) if waiting.is_empty() => return,
+            Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LOOK),
+        }
+        waiting = waiting.into_iter().filter_map(|one| look_at(one, chain)).collect();
+    }
+}
+
+/// One that still waits after that.
+fn look_at(
+    (mut ready, failures, then): (Ready, u32, Instant),
+    chain: &Sender<Chained>,
+) -> Option<(Ready, u32, Instant)> {
+    let travel = ready.travel.clone();
+    let is_wanted = travel.job.is_wanted();
+    if is_wanted && Instant::now() < then {
+        return Some((ready, failures, then));
+    }
+    let _in_stage = travel.in_stage(Stage::Write);
+    match try_to_put(&mut ready) {
+        Err(error) if is_wanted && ready.is_there() && !error.is_lasting() => {
+            tracing::debug!(failures, "the result is still not written: {error}");
+            travel.is_in_trouble(Some(error.to_string()));
+            Some((ready, failures + 1, Instant::now() + passing::pause(failures + 1)))
+        }
+        ended => {
+            travel.is_in_trouble(None);
+            end(ready, ended, chain);
+            None
+        }
+    }
+}
