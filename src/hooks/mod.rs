@@ -10,6 +10,7 @@
 //! group is ended with it.
 
 mod account;
+mod output;
 mod process;
 mod template;
 
@@ -174,7 +175,7 @@ pub fn are_due(hooks: &[Hook], target: &Target) -> bool {
 }
 
 /// Runs `hooks` for a certified result and writes the account beside its report. `staging` is a folder on the same
-/// file system, for outputs; `wanted` is asked all the time whether to go on.
+/// file system; `wanted` is asked all the time whether to go on.
 ///
 /// None where no account is written: there are no hooks, or the result is no longer wanted (or no longer there, or
 /// another one). Blocks as long as the commands take, but not much longer than their time limits.
@@ -222,7 +223,7 @@ fn run_one(hook: &Hook, target: &Target, staging: &Path, wanted: &dyn Fn() -> bo
     let mut command = program(hook, target);
     let words = told(&command);
     tracing::debug!(command = ?words, "command begins");
-    let ran = match process::run(&mut command, staging, hook.limits(), wanted) {
+    let ran = match process::run(&mut command, hook.limits(), wanted) {
         Ok(ended) => Ran::ended(hook, words, ended, hook.limits()),
         Err(Trouble::Start(error)) => Some(Ran::not_started(hook, words, &error)),
         Err(Trouble::System(error)) => return Err(at(staging)(error)),
@@ -261,5 +262,5 @@ fn write(account: &Account, target: &Target, staging: &Path) -> Result<(), HookE
     File::open(&target.folder).and_then(|f| f.sync_all()).map_err(at(&target.folder))
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests;
