@@ -315,7 +315,10 @@ fn clear_stale(staging: &Path) {
         |e: &fs::DirEntry| e.file_type().is_ok_and(|t| t.is_dir()) && e.file_name().to_string_lossy().starts_with(RUN);
     for folder in entries.flatten().filter(is_run).map(|e| e.path()) {
         let removed = match own::lock_file_there(&folder, LOCK).map(|lock| lock.try_lock().is_ok()) {
-            Ok(true) => fs::remove_dir_all(&folder),
+            Ok(true) => {
+                crate::hooks::end_those_of(&folder);
+                fs::remove_dir_all(&folder)
+            }
             Ok(false) => Ok(()),
             // Fails where something is in it.
             Err(_) => fs::remove_dir(&folder),

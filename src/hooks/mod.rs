@@ -7,9 +7,11 @@
 //! configured anew; a failure is not repeated.
 //!
 //! No shell is involved: a file name is one argument, whatever it holds. What a command leaves running in its process
-//! group is ended with it.
+//! group is ended with it, and what a killed planish has left running is ended before anything runs again
+//! ([`end_those_of`]).
 
 mod account;
+mod orphans;
 mod output;
 mod process;
 mod template;
@@ -19,6 +21,7 @@ use crate::settings::OnCertified;
 use crate::shown::{printable, printable_json, shown};
 use crate::stages::read_file;
 pub use account::{Account, Outcome, Ran, SCHEMA};
+pub use orphans::end_those_of;
 use process::{Limits, Trouble};
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -174,8 +177,8 @@ pub fn are_due(hooks: &[Hook], target: &Target) -> bool {
     account(target).is_none_or(|a| !a.is_of(hooks, &report))
 }
 
-/// Runs `hooks` for a certified result and writes the account beside its report. `staging` is a folder on the same
-/// file system; `wanted` is asked all the time whether to go on.
+/// Runs `hooks` for a certified result and writes the account beside its report. `staging` is the staging folder
+/// of this process, on the same file system; `wanted` is asked all the time whether to go on.
 ///
 /// None where no account is written: there are no hooks, or the result is no longer wanted (or no longer there, or
 /// another one). Blocks as long as the commands take, but not much longer than their time limits.
@@ -223,6 +226,7 @@ fn run_one(hook: &Hook, target: &Target, staging: &Path, wanted: &dyn Fn() -> bo
     let mut command = program(hook, target);
     let words = told(&command);
     tracing::debug!(command = ?words, "command begins");
+    orphans::mark(&mut command, staging).map_err(at(staging))?;
     let ran = match process::run(&mut command, hook.limits(), wanted) {
         Ok(ended) => Ran::ended(hook, words, ended, hook.limits()),
         Err(Trouble::Start(error)) => Some(Ran::not_started(hook, words, &error)),

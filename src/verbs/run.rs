@@ -2,6 +2,7 @@
 
 use super::{Exit, complain, shown};
 use crate::conveyor::Conveyor;
+use crate::hooks;
 use crate::inputs;
 use crate::job::{Done, End, Job};
 use crate::outcome::Status;
@@ -36,6 +37,8 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     jobs.iter().for_each(|job| conveyor.submit(job.clone()));
     conveyor.close();
     let ends = follow(&jobs, &conveyor, &stop, settings.quiet);
+    // Where it was told twice to stop.
+    hooks::end_those_of(publisher.staging());
     publisher.close();
     let rows: Vec<Row> = jobs.iter().map(AsRef::as_ref).zip(&ends).collect();
     if !settings.quiet {

@@ -4,6 +4,7 @@ use super::{Exit, shown};
 use crate::conveyor::Conveyor;
 use crate::daemon::Daemon;
 use crate::holding;
+use crate::hooks;
 use crate::places::{self, Place};
 use crate::publish::Publisher;
 use crate::settings::{Inputs, Settings};
@@ -33,7 +34,9 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
     let conveyor = Conveyor::start(settings, publisher.clone()).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
     let ended = Daemon::new(inbox, settings, &conveyor, (&lock, publisher.staging())).run(&stop)?;
-    // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more.
+    // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more, and no command
+    // runs on.
+    hooks::end_those_of(publisher.staging());
     publisher.close();
     tracing::info!(certified = ended.certified, refused = ended.refused, failed = ended.failed, "stopped");
     Ok(Exit::Success)
