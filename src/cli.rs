@@ -126,6 +126,9 @@ pub struct Making {
     /// Compute this much at once: inputs, or charts of one input [default: the number of processors]
     #[arg(long, value_name = "N")]
     pub jobs: Option<usize>,
+    /// Run commands (of the settings file) on this many results at once [default: twice --jobs, but at least 4]
+    #[arg(long, value_name = "N")]
+    pub commands: Option<usize>,
     /// Memory for inputs on their way and factorisations, as 8GiB or 500M; what needs more alone is done alone [default:
     /// half of the machine's]
     #[arg(long, value_name = "SIZE")]
@@ -257,6 +260,7 @@ impl Making {
             size: self.size,
             force: self.force.then_some(true),
             jobs: self.jobs,
+            commands: self.commands,
             memory: self.memory,
             ..Said::default()
         }

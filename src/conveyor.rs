@@ -84,7 +84,7 @@ impl Conveyor {
         for belt in 0..queue::BELTS {
             conveyor.belt(belt, &chain)?;
         }
-        conveyor.stage("chain", settings.jobs, chained, follow_up)?;
+        conveyor.stage("chain", settings.commands, chained, follow_up)?;
         Ok(conveyor)
     }
 

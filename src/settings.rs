@@ -43,6 +43,8 @@ pub struct Said {
     pub force: Option<bool>,
     /// How much is computed at once.
     pub jobs: Option<usize>,
+    /// On how many results commands run at once.
+    pub commands: Option<usize>,
     /// Memory for inputs on their way and factorisations.
     pub memory: Option<ByteSize>,
     /// Look at the inbox regularly instead of being told by the system.
@@ -90,6 +92,8 @@ pub struct Settings {
     pub force: bool,
     /// How much is computed at once.
     pub jobs: usize,
+    /// On how many results commands run at once.
+    pub commands: usize,
     /// Memory for inputs on their way and factorisations, in bytes.
     pub memory: u64,
     /// Look at the inbox regularly instead of being told by the system.
@@ -148,6 +152,9 @@ pub enum SettingsError {
     /// Nothing could be computed, or too much.
     #[error("jobs is {0}; it must lie between 1 and {MOST_JOBS}")]
     Jobs(usize),
+    /// No command could run, or too many at once.
+    #[error("commands is {0}; it must lie between 1 and {MOST_COMMANDS}")]
+    Commands(usize),
     /// Too little to do anything.
     #[error("memory is {0}; it must be at least {LEAST_MEMORY}")]
     Memory(ByteSize),
@@ -179,6 +186,12 @@ pub enum SettingsError {
 
 /// More computations at once than this are a slip of the finger.
 const MOST_JOBS: usize = 1024;
+
+/// More commands at once than this are one, too.
+const MOST_COMMANDS: usize = 2 * MOST_JOBS;
+
+/// Commands run at once, at least, where nothing is said: one that hangs must not hold up all others.
+const USUAL_COMMANDS: usize = 4;
 
 /// Less memory than this is a slip of the finger.
 const LEAST_MEMORY: ByteSize = ByteSize::mib(16);
@@ -223,6 +236,7 @@ impl Said {
             size: self.size.or(other.size),
             force: self.force.or(other.force),
             jobs: self.jobs.or(other.jobs),
+            commands: self.commands.or(other.commands),
             memory: self.memory.or(other.memory),
             poll: self.poll.or(other.poll),
             recursive: self.recursive.or(other.recursive),
@@ -272,6 +286,10 @@ impl Said {
         if !(1..=MOST_JOBS).contains(&jobs) {
             return Err(SettingsError::Jobs(jobs));
         }
+        let commands = self.commands.unwrap_or_else(|| USUAL_COMMANDS.max(2 * jobs));
+        if !(1..=MOST_COMMANDS).contains(&commands) {
+            return Err(SettingsError::Commands(commands));
+        }
         let memory = self.memory.unwrap_or_else(half_of_the_memory);
         if memory < LEAST_MEMORY {
             return Err(SettingsError::Memory(memory));
@@ -289,6 +307,7 @@ impl Said {
             size: self.size,
             force: self.force.unwrap_or(false),
             jobs,
+            commands,
             memory,
             poll: self.poll.unwrap_or(false),
             recursive: self.recursive.unwrap_or(false),
@@ -355,12 +374,12 @@ mod tests {
     fn commands_are_said_in_the_file_and_checked_at_once() {
         let read = |text: &str| toml::from_str::<Said>(text);
         let said = read(
-            "order = 1\n[[on_certified]]\ncommand = [\"gmsh\", \"{remesh}\"]\ntime-limit = 600\n\
+            "order = 1\n[[on_certified]]\ncommand = [\"gmsh\", \"{remesh}\"]\ntime-limit = 60\n\
              [[on_certified]]\ncommand = [\"a\"]\n",
         );
         let settings = Said::default().or(said.expect("valid")).check().expect("in range");
         let limits: Vec<f64> = settings.on_certified.iter().map(|h| h.configured().time_limit).collect();
-        assert_eq!(limits, [600.0, 3600.0]);
+        assert_eq!(limits, [60.0, 600.0]);
         for wrong in ["command = \"gmsh\"", "command = [1]", "time-limit = 1", "command = [\"a\"]\ntime_limit = 1"] {
             assert!(read(&format!("[[on_certified]]\n{wrong}")).is_err(), "{wrong}");
         }
@@ -380,5 +399,12 @@ mod tests {
             let told = said.expect("well-formed").check().expect_err(text).to_string();
             assert!(told.starts_with("[[on_certified]], table 2: ") && told.contains(expected), "{told}");
         }
+    }
+
+    #[test]
+    fn commands_run_beside_each_other_even_where_there_is_one_processor() {
+        let commands = |text: &str| toml::from_str::<Said>(text).expect("valid").check().map(|s| s.commands).ok();
+        assert_eq!(["jobs = 1", "jobs = 3", "jobs = 1024"].map(commands), [Some(4), Some(6), Some(2048)]);
+        assert_eq!(["jobs = 3\ncommands = 1", "commands = 0", "commands = 2049"].map(commands), [Some(1), None, None]);
     }
 }

@@ -45,6 +45,7 @@ fn the_example_works_as_it_is_and_switched_on_and_shows_the_defaults() {
         max_triangles: all.max_triangles,
         size: all.size,
         jobs: all.jobs,
+        commands: all.commands,
         memory: all.memory,
         on_certified: all.on_certified.clone(),
         ..as_it_is

@@ -102,13 +102,13 @@ impl TryFrom<String> for Inputs {
 pub struct OnCertified {
     /// Program and arguments, with placeholders such as `{folder}`.
     pub command: Vec<String>,
-    /// Wall-clock seconds after which it is ended; an hour where nothing is said.
-    #[serde(rename = "time-limit", default = "an_hour")]
+    /// Wall-clock seconds after which it is ended; ten minutes where nothing is said.
+    #[serde(rename = "time-limit", default = "ten_minutes")]
     pub time_limit: f64,
 }
 
-fn an_hour() -> f64 {
-    3600.0
+fn ten_minutes() -> f64 {
+    600.0
 }
 
 /// What is too much for one input: the table `[limits]` of planish.toml. Files may come from anyone.
