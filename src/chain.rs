@@ -1,6 +1,6 @@
 //! What follows when a result is certified: the commands run on it, and its input is put away.
 
-use crate::hooks::{self, HookError, Target};
+use crate::hooks::{self, Chain, HookError, Target};
 use crate::job::Job;
 use crate::publish::Publisher;
 use crate::put_away::{Fate, Processed, PutAwayError, Way, put_away};
@@ -36,6 +36,9 @@ pub enum Followed {
     /// All is done but that the input is put away: its content is no longer what was processed, whether that shows or
     /// not. It is to be processed again.
     Changed,
+    /// The result was moved or removed while this command ran (1 is the first). To process the input again would only
+    /// have it taken again.
+    Taken(usize),
 }
 
 /// Whether anything follows.
@@ -53,11 +56,11 @@ pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publishe
     let hooks = &settings.on_certified;
     if hooks::are_due(hooks, &target) {
         tracing::info!(commands = hooks.len(), "runs commands");
-        let Some(account) = hooks::run(hooks, &target, publisher.staging(), &|| job.is_wanted())? else {
-            return Ok(Followed::BrokenOff);
-        };
-        if account.failure().is_none() {
-            tracing::info!("commands have succeeded");
+        match hooks::run(hooks, &target, publisher.staging(), &|| job.is_wanted())? {
+            Chain::BrokenOff => return Ok(Followed::BrokenOff),
+            Chain::Taken(command) => return Ok(Followed::Taken(command)),
+            Chain::Over(account) if account.failure().is_none() => tracing::info!("commands have succeeded"),
+            Chain::Over(_) => {}
         }
     }
     let all_succeeded = hooks.is_empty() || hooks::account(&target).is_some_and(|a| a.failure().is_none());

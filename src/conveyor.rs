@@ -439,9 +439,23 @@ fn follow_up(Chained { travel, done }: Chained) {
             );
             End::Outdated(done)
         }
+        Ok(Followed::Taken(command)) => {
+            let error = taken(command);
+            tracing::error!("{error}");
+            End::Taken(done, error)
+        }
         Err(error) => {
             tracing::error!("{error}");
             End::Unchained(done, error.to_string())
         }
     });
+}
+
+/// What to do about a command that takes the result away.
+fn taken(command: usize) -> String {
+    format!(
+        "command {command} on the result, or somebody while it ran, has moved or removed the result or its report.json: \
+         its input is not processed again before it changes or planish is started anew; let commands copy what they \
+         need, and to clear the inbox use `--inputs move:DIR`"
+    )
 }

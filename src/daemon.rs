@@ -180,7 +180,7 @@ impl<'a> Daemon<'a> {
             let Some(look) = job.look else { return };
             self.eyes.look_beside(&job.name, job.beside());
             match end {
-                End::Done(_) => self.inbox.done(&job.name, &look),
+                End::Done(_) | End::Taken(..) => self.inbox.done(&job.name, &look),
                 End::Later(_, then) => self.inbox.again(&job.name, &look, then),
                 // What it waits for is part of what is seen of it now.
                 End::Waiting(reason) => {

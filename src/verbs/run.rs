@@ -152,7 +152,9 @@ fn tell_trouble(job: &Job, end: &End) {
     let input = shown(&job.path);
     match end {
         End::Unwritten(error) => complain(&format!("{input}: {error}")),
-        End::Unchained(_, error) => complain(&format!("{input}: certified, but {error}")),
+        End::Taken(done, error) | End::Unchained(done, error) => {
+            complain(&format!("{input}: {}, but {error}", done.report.status));
+        }
         End::Changed => complain(&format!("{input}: it changed while it was read; try again")),
         End::Waiting(reason) => complain(&format!("{input}: {}", reason.message)),
         End::Lost => complain(&format!("{input}: planish broke down; that is a fault of planish: please report it")),

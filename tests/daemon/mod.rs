@@ -1,6 +1,7 @@
 //! `planish watch`: the real program, fed, disturbed, stopped and killed.
 
 mod chaining;
+mod commanding;
 mod dropping;
 mod killing;
 mod many;

@@ -2,7 +2,7 @@
 
 use super::{run, script, tools};
 use crate::support::{Out, fixture, planish, root};
-use planish::hooks::{self, Hook, Outcome, Target};
+use planish::hooks::{self, Account, Chain, Hook, Outcome, Target};
 use planish::report::mesh::MeshReport;
 use planish::settings::{OnCertified, Said};
 use std::path::Path;
@@ -21,6 +21,14 @@ fn with_tools(hook: &Hook) -> Hook {
     let path = format!("PATH={}", tools().to_str().expect("UTF-8"));
     let command = ["env".to_owned(), path].into_iter().chain(command).collect();
     Hook::new(OnCertified { command, time_limit }).expect("valid")
+}
+
+/// Runs all commands to their end.
+fn ran(hooks: &[Hook], target: &Target, out: &Out) -> Account {
+    match hooks::run(hooks, target, out.path(), &|| true).expect("the system helps") {
+        Chain::Over(account) => account,
+        other => panic!("an account is expected: {other:?}"),
+    }
 }
 
 /// A certified result, and its target.
@@ -48,7 +56,7 @@ fn the_recipe_makes_a_mesh_and_nothing_else() {
     let before = files(target.folder());
     let said: Said = toml::from_str(&settings_file()).expect("valid");
     let recipe: Vec<Hook> = said.check().expect("in range").on_certified.iter().map(with_tools).collect();
-    let account = hooks::run(&recipe, &target, out.path(), &|| true).expect("the system helps").expect("an account");
+    let account = ran(&recipe, &target, &out);
     assert_eq!(account.failure(), None);
     let mut after: Vec<String> = files(target.folder());
     after.retain(|f| !before.contains(f));
@@ -77,7 +85,7 @@ fn a_mesh_that_is_not_faithful_is_told() {
     let OnCertified { command, time_limit } = recipe[1].configured().clone();
     let command = command.iter().map(|part| part.replace("remeshed.msh", "remeshed.obj")).collect();
     recipe[1] = Hook::new(OnCertified { command, time_limit }).expect("valid");
-    let account = hooks::run(&recipe, &target, out.path(), &|| true).expect("the system helps").expect("an account");
+    let account = ran(&recipe, &target, &out);
     assert!(account.failure().is_some(), "{account:?}");
     let outcomes: Vec<Outcome> = account.commands.iter().map(|c| c.outcome).collect();
     assert_eq!(outcomes, [Outcome::Succeeded, Outcome::Failed]);
@@ -105,8 +113,7 @@ fn accounts_follow_the_published_schema_and_leave_the_proof_alone() {
     ];
     for (commands, outcome) in cases {
         assert!(hooks::are_due(&commands, &target));
-        let account =
-            hooks::run(&commands, &target, out.path(), &|| true).expect("the system helps").expect("an account");
+        let account = ran(&commands, &target, &out);
         assert_eq!(account.commands[0].outcome, outcome);
         let schema = root().join("docs/hooks.schema.json");
         let written = target.folder().join(hooks::FILE);
