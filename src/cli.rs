@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::settings::{FeatureAngle, HandOff, Inputs, Log, Said, Settings, SettingsError};
+use crate::settings::{FeatureAngle, HandOff, Inputs, Log, Refused, Said, Settings, SettingsError};
 use crate::verbs::check_mesh::Question;
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
@@ -66,6 +66,10 @@ pub struct Watch {
     /// [default: keep]
     #[arg(long, value_name = "keep|move:DIR|delete")]
     pub inputs: Option<Inputs>,
+    /// What becomes of an input that is refused or failed, once all commands on it have succeeded: keep or move:DIR
+    /// [default: keep]
+    #[arg(long, value_name = "keep|move:DIR")]
+    pub refused: Option<Refused>,
     /// Shared options
     #[command(flatten)]
     pub making: Making,
@@ -241,6 +245,7 @@ impl Watch {
             recursive: self.recursive.then_some(true),
             drain: self.drain.then_some(true),
             inputs: self.inputs.clone(),
+            refused: self.refused.clone(),
             ..self.making.said()
         }
     }

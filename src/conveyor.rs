@@ -1,5 +1,5 @@
 //! The stages, on threads of their own, and the bounded channels between them:
-//! **read -> decompose -> map -> untangle -> write**, and behind them the commands that run on certified results.
+//! **read -> decompose -> map -> untangle -> write**, and behind them the commands that run on results.
 //!
 //! What travels before mapping and after it is a chart, not a file: the charts of one large input keep all processors
 //! busy, and so do many small inputs. Rules that keep it moving:
@@ -211,7 +211,7 @@ enum Finished {
     Stopped(Arc<Travel>, Box<Report>, Stopped),
 }
 
-/// What the commands get: a certified result.
+/// What the commands get: a result.
 struct Chained {
     travel: Arc<Travel>,
     done: Done,
@@ -413,18 +413,18 @@ fn log(report: &Report) {
     }
 }
 
-/// A result stands: what is certified goes to the commands, where there are any. These may take hours, and memory of
-/// their own.
+/// A result stands: it goes to the commands, where there are any for such a one. These may take hours, and memory of their
+/// own.
 fn published(travel: Arc<Travel>, done: Done, chain: &Sender<Chained>) {
     travel.give_memory_back();
-    if done.report.status == Status::Certified && chain::is_asked_for(&travel.shared.settings) {
+    if chain::is_asked_for(&travel.shared.settings, done.report.status) {
         hand_on(chain, Chained { travel, done });
     } else {
         travel.end(End::Done(done));
     }
 }
 
-/// Runs the commands on a certified result, and puts its input away.
+/// Runs the commands on a result, and puts its input away.
 fn follow_up(Chained { travel, done }: Chained) {
     travel.reached(Stage::Chain);
     let _in_stage = travel.in_stage(Stage::Chain);

@@ -3,13 +3,13 @@
 mod values;
 
 use crate::formats::Limits;
-use crate::hooks::{Hook, HookRefused};
+use crate::hooks::{Hook, HookRefused, Occasion};
 use crate::shown::shown;
 use bytesize::ByteSize;
 use pipeline::Order;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-pub use values::{FeatureAngle, HandOff, Inputs, LimitsSaid, Log, Off, OnCertified};
+pub use values::{CommandSaid, FeatureAngle, HandOff, Inputs, LimitsSaid, Log, Off, Refused};
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
 /// the file alone.
@@ -55,6 +55,8 @@ pub struct Said {
     pub drain: Option<bool>,
     /// What becomes of certified inputs.
     pub inputs: Option<Inputs>,
+    /// What becomes of inputs that are refused or failed.
+    pub refused: Option<Refused>,
     /// What is too much for one input.
     pub limits: Option<LimitsSaid>,
     /// Form of log messages.
@@ -64,7 +66,9 @@ pub struct Said {
     /// Print nothing but errors.
     pub quiet: Option<bool>,
     /// Commands that run after an input is certified, in their order.
-    pub on_certified: Option<Vec<OnCertified>>,
+    pub on_certified: Option<Vec<CommandSaid>>,
+    /// Commands that run after an input is refused or failed, in their order.
+    pub on_refused: Option<Vec<CommandSaid>>,
 }
 
 /// Checked settings.
@@ -104,6 +108,8 @@ pub struct Settings {
     pub drain: bool,
     /// What becomes of certified inputs.
     pub inputs: Inputs,
+    /// What becomes of inputs that are refused or failed; they are never deleted.
+    pub refused: Inputs,
     /// What is too much for one input.
     pub limits: Limits,
     /// Form of log messages.
@@ -114,6 +120,8 @@ pub struct Settings {
     pub quiet: bool,
     /// Commands that run after an input is certified, in their order.
     pub on_certified: Vec<Hook>,
+    /// Commands that run after an input is refused or failed, in their order.
+    pub on_refused: Vec<Hook>,
 }
 
 impl Settings {
@@ -159,8 +167,10 @@ pub enum SettingsError {
     #[error("memory is {0}; it must be at least {LEAST_MEMORY}")]
     Memory(ByteSize),
     /// A command cannot run.
-    #[error("[[on_certified]], table {table}: {error}")]
-    OnCertified {
+    #[error("[[{occasion}]], table {table}: {error}")]
+    Command {
+        /// In which tables.
+        occasion: Occasion,
         /// Which, from 1.
         table: usize,
         /// Why.
@@ -242,11 +252,13 @@ impl Said {
             recursive: self.recursive.or(other.recursive),
             drain: self.drain.or(other.drain),
             inputs: self.inputs.or(other.inputs),
+            refused: self.refused.or(other.refused),
             limits: self.limits.or(other.limits),
             log: self.log.or(other.log),
             verbose: self.verbose.or(other.verbose),
             quiet: self.quiet.or(other.quiet),
             on_certified: self.on_certified.or(other.on_certified),
+            on_refused: self.on_refused.or(other.on_refused),
         }
     }
 
@@ -313,18 +325,22 @@ impl Said {
             recursive: self.recursive.unwrap_or(false),
             drain: self.drain.unwrap_or(false),
             inputs: self.inputs.unwrap_or_default(),
+            refused: self.refused.unwrap_or_default().0,
             limits: self.limits.unwrap_or_default().or_default(),
             log: self.log.unwrap_or_default(),
             verbose: self.verbose.unwrap_or(0),
             quiet: self.quiet.unwrap_or(false),
-            on_certified: hooks(self.on_certified.unwrap_or_default())?,
+            on_certified: hooks(self.on_certified, Occasion::Certified)?,
+            on_refused: hooks(self.on_refused, Occasion::Refused)?,
         })
     }
 }
 
-fn hooks(said: Vec<OnCertified>) -> Result<Vec<Hook>, SettingsError> {
-    let check = |(i, hook)| Hook::new(hook).map_err(|error| SettingsError::OnCertified { table: i + 1, error });
-    said.into_iter().enumerate().map(check).collect()
+fn hooks(said: Option<Vec<CommandSaid>>, occasion: Occasion) -> Result<Vec<Hook>, SettingsError> {
+    let check = |(i, command)| {
+        Hook::new(command, occasion).map_err(|error| SettingsError::Command { occasion, table: i + 1, error })
+    };
+    said.unwrap_or_default().into_iter().enumerate().map(check).collect()
 }
 
 #[cfg(test)]
@@ -399,6 +415,11 @@ mod tests {
             let told = said.expect("well-formed").check().expect_err(text).to_string();
             assert!(told.starts_with("[[on_certified]], table 2: ") && told.contains(expected), "{told}");
         }
+        let refused = read("[[on_refused]]\ncommand = [\"mail\", \"{code}\", \"{input}\"]").expect("well-formed");
+        assert_eq!(refused.check().expect("in range").on_refused.len(), 1);
+        let wrong = read("[[on_refused]]\ncommand = [\"gmsh\", \"{remesh}\"]").expect("well-formed");
+        let told = wrong.check().expect_err("there is no such file").to_string();
+        assert!(told.starts_with("[[on_refused]], table 1: command, part 2 (\"{remesh}\"): "), "{told}");
     }
 
     #[test]
@@ -406,5 +427,16 @@ mod tests {
         let commands = |text: &str| toml::from_str::<Said>(text).expect("valid").check().map(|s| s.commands).ok();
         assert_eq!(["jobs = 1", "jobs = 3", "jobs = 1024"].map(commands), [Some(4), Some(6), Some(2048)]);
         assert_eq!(["jobs = 3\ncommands = 1", "commands = 0", "commands = 2049"].map(commands), [Some(1), None, None]);
+    }
+
+    #[test]
+    fn refused_inputs_are_never_deleted() {
+        let read = |text: &str| toml::from_str::<Said>(text);
+        let moved = read("refused = \"move:bad\"").expect("valid").check().expect("in range").refused;
+        assert_eq!(moved, Inputs::Move("bad".into()));
+        for wrong in ["delete", "move:", "bad"] {
+            let told = read(&format!("refused = \"{wrong}\"")).expect_err(wrong).to_string();
+            assert!(told.contains("is none of keep and move:DIR"), "{told}");
+        }
     }
 }

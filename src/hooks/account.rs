@@ -3,7 +3,7 @@
 use super::Hook;
 use super::output::Tail;
 use super::process::{End, Ended, Limits};
-use crate::settings::OnCertified;
+use crate::settings::CommandSaid;
 use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;
 
@@ -85,7 +85,7 @@ impl Account {
 
 impl Ran {
     fn is_of(&self, hook: &Hook) -> bool {
-        let OnCertified { command, time_limit } = hook.configured();
+        let CommandSaid { command, time_limit } = hook.configured();
         (&self.configured, self.time_limit) == (command, *time_limit)
     }
 

@@ -1,4 +1,4 @@
-//! Commands that run after an input is certified: `[[on_certified]]` of planish.toml.
+//! Commands that run when an input is done: `[[on_certified]]` and `[[on_refused]]` of planish.toml.
 //!
 //! The commands of a result are a chain: they run one after another, in the result folder, and where one does not
 //! succeed the ones after it are skipped. What they did stands in `hooks.json` beside the report (docs/hooks.md). A
@@ -22,7 +22,7 @@ mod template;
 
 use crate::passing;
 use crate::report;
-use crate::settings::OnCertified;
+use crate::settings::CommandSaid;
 use crate::shown::{printable, printable_json, shown};
 use crate::stages::read_file;
 pub use account::{Account, Outcome, Ran, SCHEMA};
@@ -45,10 +45,29 @@ const OUTPUT: u64 = 256 << 20;
 /// How long a command may take to end when it is asked to (SIGTERM), before it is killed.
 const GRACE: Duration = Duration::from_secs(2);
 
+/// When commands run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Occasion {
+    /// An input is certified.
+    Certified,
+    /// An input is refused, or failed.
+    Refused,
+}
+
+/// As the tables of planish.toml are named.
+impl std::fmt::Display for Occasion {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Certified => "on_certified",
+            Self::Refused => "on_refused",
+        })
+    }
+}
+
 /// A command, checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hook {
-    configured: OnCertified,
+    configured: CommandSaid,
     arguments: Vec<Template>,
 }
 
@@ -77,17 +96,18 @@ pub enum HookRefused {
 }
 
 impl Hook {
-    /// Checks a command.
+    /// Checks a command for this occasion.
     ///
     /// # Errors
     /// [`HookRefused`] for what can never run.
-    pub fn new(configured: OnCertified) -> Result<Self, HookRefused> {
-        let OnCertified { command, time_limit } = &configured;
+    pub fn new(configured: CommandSaid, occasion: Occasion) -> Result<Self, HookRefused> {
+        let CommandSaid { command, time_limit } = &configured;
         if !(*time_limit > 0.0 && time_limit.is_finite()) {
             return Err(HookRefused::TimeLimit(*time_limit));
         }
         let parse = |(i, text): (usize, &String)| {
-            Template::parse(text).map_err(|error| HookRefused::Argument { part: i + 1, text: text.clone(), error })
+            let refused = |error| HookRefused::Argument { part: i + 1, text: text.clone(), error };
+            Template::parse(text, occasion).map_err(refused)
         };
         let arguments = command.iter().enumerate().map(parse).collect::<Result<Vec<_>, _>>()?;
         match arguments.first() {
@@ -98,7 +118,7 @@ impl Hook {
     }
 
     /// The command as it is configured.
-    pub fn configured(&self) -> &OnCertified {
+    pub fn configured(&self) -> &CommandSaid {
         &self.configured
     }
 
@@ -112,6 +132,7 @@ impl Hook {
 pub struct Target {
     input: PathBuf,
     folder: PathBuf,
+    code: String,
 }
 
 impl Target {
@@ -121,7 +142,12 @@ impl Target {
     /// [`HookError`] where a path is empty, or relative to a folder that is gone.
     pub fn new(input: &Path, folder: &Path) -> Result<Self, HookError> {
         let absolute = |path: &Path| std::path::absolute(path).map_err(at(path));
-        Ok(Self { input: absolute(input)?, folder: absolute(folder)? })
+        Ok(Self { input: absolute(input)?, folder: absolute(folder)?, code: String::new() })
+    }
+
+    /// The result of an input that was refused, or failed, for this reason.
+    pub fn with_code(self, code: String) -> Self {
+        Self { code, ..self }
     }
 
     /// The input file, by its absolute path.
@@ -132,6 +158,11 @@ impl Target {
     /// The result folder, by its absolute path.
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// The code of the reason; empty for a certified input.
+    pub fn code(&self) -> &str {
+        &self.code
     }
 
     /// Whether the result is where it was published.
@@ -152,7 +183,7 @@ impl Target {
 pub enum HookError {
     /// The system refuses.
     #[error(
-        "commands after certification: {}: {error}; check that the disk has room and the folder may be written",
+        "commands cannot run: {}: {error}; check that the disk has room and the folder may be written",
         shown(.path)
     )]
     Io {
@@ -162,7 +193,7 @@ pub enum HookError {
         error: io::Error,
     },
     /// There is no result.
-    #[error("commands after certification: {} holds no report.json that can be read; process its input again", shown(.0))]
+    #[error("commands cannot run: {} holds no report.json that can be read; process its input again", shown(.0))]
     NoReport(PathBuf),
     /// The system has no room for another process at the moment.
     #[error(

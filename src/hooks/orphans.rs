@@ -86,8 +86,8 @@ mod linux {
         }
         tracing::error!(
             staging = shown(&staging),
-            "a command that planish has left running does not even end when it is killed: it may run twice now; find it \
-             by {STAGING} in its environment (`ps eww`)"
+            "a command that planish has left running does not even end when it is killed: it may run twice now; find \
+             it by {STAGING} in its environment (`ps eww`)"
         );
     }
 

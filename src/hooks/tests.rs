@@ -44,7 +44,7 @@ impl World {
 
 fn hook(command: &[&str], time_limit: f64) -> Hook {
     let command = command.iter().map(ToString::to_string).collect();
-    Hook::new(OnCertified { command, time_limit }).expect("valid")
+    Hook::new(CommandSaid { command, time_limit }, Occasion::Certified).expect("valid")
 }
 
 fn sh(script: &str) -> Hook {

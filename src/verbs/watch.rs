@@ -21,15 +21,13 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
     let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
     std::fs::read_dir(inbox).map_err(|e| format!("cannot watch {}: {e}; make the folder first", shown(inbox)))?;
     places::refuse_nested(&places(inbox, out, settings))?;
-    if settings.inputs != Inputs::Keep {
+    if settings.inputs != Inputs::Keep || settings.refused != Inputs::Keep {
         holding::try_out(inbox)?;
     }
     let publisher = Arc::new(Publisher::open(out)?);
     let lock = Lock::take(out)?;
     holding::recover(inbox, settings.recursive);
-    if let Inputs::Move(folder) = &settings.inputs {
-        holding::clear(folder, settings.recursive);
-    }
+    destinations(settings).for_each(|(_, folder)| holding::clear(folder, settings.recursive));
     let stop = signals::listen()?;
     let conveyor = Conveyor::start(settings, publisher.clone()).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
@@ -45,8 +43,15 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
 /// The folders that must not lie in each other.
 fn places<'a>(inbox: &'a Path, out: &'a Path, settings: &'a Settings) -> Vec<Place<'a>> {
     let mut all = vec![Place::new("inbox", inbox), Place::new("output folder", out)];
-    if let Inputs::Move(folder) = &settings.inputs {
-        all.push(Place::new("folder for inputs", folder));
-    }
+    all.extend(destinations(settings).map(|(role, folder)| Place::new(role, folder)));
     all
+}
+
+/// The folders to which inputs are moved, with what they are for.
+fn destinations(settings: &Settings) -> impl Iterator<Item = (&'static str, &Path)> {
+    let all = [("folder for inputs", &settings.inputs), ("folder for refused inputs", &settings.refused)];
+    all.into_iter().filter_map(|(role, inputs)| match inputs {
+        Inputs::Move(folder) => Some((role, folder.as_path())),
+        Inputs::Keep | Inputs::Delete => None,
+    })
 }

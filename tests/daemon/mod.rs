@@ -6,6 +6,7 @@ mod dropping;
 mod killing;
 mod many;
 mod putting_away;
+mod refusing;
 mod stopping;
 
 use crate::support::Out;
