@@ -111,6 +111,7 @@ fn a_refused_input_that_is_mended_is_not_moved() {
     w.start();
     w.drop_in("a.stl", b"garbage");
     w.wait_for(&[("a.stl", b"garbage")]);
+    std::thread::sleep(std::time::Duration::from_secs(3));
     assert!(w.inbox().join("a.stl").exists(), "it has not been quiet for long");
     let good = disk(4, 0.0);
     w.drop_in("a.stl", &good);
