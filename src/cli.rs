@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::settings::{FeatureAngle, HandOff, Inputs, Log, Said, Settings, SettingsError};
+use crate::settings::{FeatureAngle, HandOff, Inputs, Log, Refused, Said, Settings, SettingsError};
 use crate::verbs::check_mesh::Question;
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
@@ -69,6 +69,10 @@ pub struct Watch {
     /// [default: keep]
     #[arg(long, value_name = "keep|move:DIR|delete")]
     pub inputs: Option<Inputs>,
+    /// What becomes of an input that is refused or failed, once all commands on it have succeeded: keep or move:DIR
+    /// [default: keep]
+    #[arg(long, value_name = "keep|move:DIR")]
+    pub refused: Option<Refused>,
     /// Shared options
     #[command(flatten)]
     pub making: Making,
@@ -129,6 +133,9 @@ pub struct Making {
     /// Compute this much at once: inputs, or charts of one input [default: the number of processors]
     #[arg(long, value_name = "N")]
     pub jobs: Option<usize>,
+    /// Run commands (of the settings file) on this many results at once [default: twice --jobs, but at least 4]
+    #[arg(long, value_name = "N")]
+    pub commands: Option<usize>,
     /// Memory for inputs on their way and factorisations, as 8GiB or 500M; what needs more alone is done alone [default:
     /// half of the machine's]
     #[arg(long, value_name = "SIZE")]
@@ -275,6 +282,7 @@ impl Watch {
             recursive: self.recursive.then_some(true),
             drain: self.drain.then_some(true),
             inputs: self.inputs.clone(),
+            refused: self.refused.clone(),
             ..self.making.said()
         }
     }
@@ -294,6 +302,7 @@ impl Making {
             size: self.size,
             force: self.force.then_some(true),
             jobs: self.jobs,
+            commands: self.commands,
             memory: self.memory,
             job_memory: self.job_memory,
             job_time: self.job_time,

@@ -1,5 +1,5 @@
 //! The stages, on threads of their own, and the bounded channels between them:
-//! **read -> decompose -> map -> untangle -> write**, and behind them the commands that run on certified results.
+//! **read -> decompose -> map -> untangle -> write**, and behind them the commands that run on results.
 //!
 //! What travels before mapping and after it is a chart, not a file: the charts of one large input keep all processors
 //! busy, and so do many small inputs. Rules that keep it moving:
@@ -92,7 +92,7 @@ impl Conveyor {
         let chain = after.chain.clone();
         conveyor.thread("parked", move || writing::look_after(to_look_after, &chain))?;
         drop(after);
-        conveyor.stage("chain", settings.jobs, chained, follow_up)?;
+        conveyor.stage("chain", settings.commands, chained, follow_up)?;
         Ok(conveyor)
     }
 
@@ -246,7 +246,7 @@ enum Finished {
     Stopped(Arc<Travel>, Box<Report>, Stopped),
 }
 
-/// What the commands get: a certified result.
+/// What the commands get: a result.
 struct Chained {
     travel: Arc<Travel>,
     done: Done,
@@ -316,18 +316,18 @@ fn log(report: &Report) {
     }
 }
 
-/// A result stands: what is certified goes to the commands, where there are any. These may take hours, and memory of
-/// their own.
+/// A result stands: it goes to the commands, where there are any for such a one. These may take hours, and memory of their
+/// own.
 fn published(travel: Arc<Travel>, done: Done, chain: &Sender<Chained>) {
     travel.give_memory_back();
-    if done.report.status == Status::Certified && chain::is_asked_for(&travel.settings) {
+    if chain::is_asked_for(&travel.settings, done.report.status) {
         hand_on(chain, Chained { travel, done });
     } else {
         travel.end(End::Done(done));
     }
 }
 
-/// Runs the commands on a certified result, and puts its input away.
+/// Runs the commands on a result, and puts its input away.
 fn follow_up(Chained { travel, done }: Chained) {
     travel.reached(Stage::Chain);
     let _in_stage = travel.in_stage(Stage::Chain);
@@ -342,9 +342,23 @@ fn follow_up(Chained { travel, done }: Chained) {
             );
             End::Outdated(done)
         }
+        Ok(Followed::Taken(command)) => {
+            let error = taken(command);
+            tracing::error!("{error}");
+            End::Taken(done, error)
+        }
         Err(error) => {
             tracing::error!("{error}");
             End::Unchained(done, error.to_string())
         }
     });
+}
+
+/// What to do about a command that takes the result away.
+fn taken(command: usize) -> String {
+    format!(
+        "command {command} on the result, or somebody while it ran, has moved or removed the result or its report.json: \
+         its input is not processed again before it changes or planish is started anew; let commands copy what they \
+         need, and to clear the inbox use `--inputs move:DIR`"
+    )
 }

@@ -262,6 +262,10 @@ impl<'a> Daemon<'a> {
                 let doubt = self.doubt(&done, now);
                 self.inbox.done(name, look, Rest::Published, doubt);
             }
+            End::Taken(_, message) => {
+                self.status.last_error = Some(Trouble::now(&message));
+                self.inbox.done(name, look, Rest::Delivered, None);
+            }
             End::Same => self.inbox.done(name, look, Rest::Published, None),
             End::Later(_, then) => {
                 self.inbox.again(name, look, then, "it is put away when it has not changed for ten seconds");

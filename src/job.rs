@@ -112,15 +112,19 @@ pub enum End {
     Unwritten(PublishError),
     /// A stage broke down outside the work on this job: a fault of planish. Nothing was published.
     Lost,
+    /// The result was made, and then moved or removed by a command that ran on it: to make it again would only have it
+    /// taken again.
+    Taken(Done, String),
     /// The result stands, but the commands on it could not be run, or the input not be put away.
     Unchained(Done, String),
 }
 
 impl End {
-    /// The result that stands, whatever became of what should follow it.
+    /// The result that stands, or has stood, whatever became of what should follow it.
     pub fn standing(&self) -> Option<&Done> {
         match self {
-            Self::Done(done) | Self::Later(done, _) | Self::Outdated(done) | Self::Unchained(done, _) => Some(done),
+            Self::Done(done) | Self::Later(done, _) | Self::Outdated(done) => Some(done),
+            Self::Taken(done, _) | Self::Unchained(done, _) => Some(done),
             Self::Same
             | Self::Unwanted
             | Self::Changed

@@ -364,6 +364,7 @@ fn clear_stale(staging: &Path) {
         let removed = match own::lock_file_there(&folder, LOCK).map(|lock| lock.try_lock().is_ok()) {
             Ok(true) => {
                 begun::take_over(staging, &folder);
+                crate::hooks::end_those_of(&folder);
                 fs::remove_dir_all(&folder)
             }
             Ok(false) => Ok(()),

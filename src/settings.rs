@@ -3,13 +3,13 @@
 mod values;
 
 use crate::formats::Limits;
-use crate::hooks::{Hook, HookRefused};
+use crate::hooks::{Hook, HookRefused, Occasion};
 use crate::shown::shown;
 use bytesize::ByteSize;
 use pipeline::Order;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-pub use values::{FeatureAngle, HandOff, Inputs, LimitsSaid, Log, Off, OnCertified};
+pub use values::{CommandSaid, FeatureAngle, HandOff, Inputs, LimitsSaid, Log, Off, Refused};
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
 /// the file alone.
@@ -43,6 +43,8 @@ pub struct Said {
     pub force: Option<bool>,
     /// How much is computed at once.
     pub jobs: Option<usize>,
+    /// On how many results commands run at once.
+    pub commands: Option<usize>,
     /// Memory for inputs on their way and factorisations.
     pub memory: Option<ByteSize>,
     /// The most memory that an input may take.
@@ -59,6 +61,8 @@ pub struct Said {
     pub drain: Option<bool>,
     /// What becomes of certified inputs.
     pub inputs: Option<Inputs>,
+    /// What becomes of inputs that are refused or failed.
+    pub refused: Option<Refused>,
     /// What is too much for one input.
     pub limits: Option<LimitsSaid>,
     /// Form of log messages.
@@ -68,7 +72,9 @@ pub struct Said {
     /// Print nothing but errors.
     pub quiet: Option<bool>,
     /// Commands that run after an input is certified, in their order.
-    pub on_certified: Option<Vec<OnCertified>>,
+    pub on_certified: Option<Vec<CommandSaid>>,
+    /// Commands that run after an input is refused or failed, in their order.
+    pub on_refused: Option<Vec<CommandSaid>>,
 }
 
 /// Checked settings.
@@ -96,6 +102,8 @@ pub struct Settings {
     pub force: bool,
     /// How much is computed at once.
     pub jobs: usize,
+    /// On how many results commands run at once.
+    pub commands: usize,
     /// Memory for inputs on their way and factorisations, in bytes.
     pub memory: u64,
     /// The memory that there is for this process, in bytes: no input may take more.
@@ -112,6 +120,8 @@ pub struct Settings {
     pub drain: bool,
     /// What becomes of certified inputs.
     pub inputs: Inputs,
+    /// What becomes of inputs that are refused or failed; they are never deleted.
+    pub refused: Inputs,
     /// What is too much for one input.
     pub limits: Limits,
     /// Form of log messages.
@@ -122,6 +132,8 @@ pub struct Settings {
     pub quiet: bool,
     /// Commands that run after an input is certified, in their order.
     pub on_certified: Vec<Hook>,
+    /// Commands that run after an input is refused or failed, in their order.
+    pub on_refused: Vec<Hook>,
 }
 
 impl Settings {
@@ -160,6 +172,9 @@ pub enum SettingsError {
     /// Nothing could be computed, or too much.
     #[error("jobs is {0}; it must lie between 1 and {MOST_JOBS}")]
     Jobs(usize),
+    /// No command could run, or too many at once.
+    #[error("commands is {0}; it must lie between 1 and {MOST_COMMANDS}")]
+    Commands(usize),
     /// Too little to do anything.
     #[error("memory is {0}; it must be at least {LEAST_MEMORY}")]
     Memory(ByteSize),
@@ -170,8 +185,10 @@ pub enum SettingsError {
     #[error("job-time is {0}; it must be a positive number of seconds")]
     JobTime(f64),
     /// A command cannot run.
-    #[error("[[on_certified]], table {table}: {error}")]
-    OnCertified {
+    #[error("[[{occasion}]], table {table}: {error}")]
+    Command {
+        /// In which tables.
+        occasion: Occasion,
         /// Which, from 1.
         table: usize,
         /// Why.
@@ -197,6 +214,12 @@ pub enum SettingsError {
 
 /// More computations at once than this are a slip of the finger.
 const MOST_JOBS: usize = 1024;
+
+/// More commands at once than this are one, too.
+const MOST_COMMANDS: usize = 2 * MOST_JOBS;
+
+/// Commands run at once, at least, where nothing is said: one that hangs must not hold up all others.
+const USUAL_COMMANDS: usize = 4;
 
 /// Less memory than this is a slip of the finger.
 const LEAST_MEMORY: ByteSize = ByteSize::mib(16);
@@ -243,6 +266,7 @@ impl Said {
             size: self.size.or(other.size),
             force: self.force.or(other.force),
             jobs: self.jobs.or(other.jobs),
+            commands: self.commands.or(other.commands),
             memory: self.memory.or(other.memory),
             job_memory: self.job_memory.or(other.job_memory),
             job_time: self.job_time.or(other.job_time),
@@ -250,11 +274,13 @@ impl Said {
             recursive: self.recursive.or(other.recursive),
             drain: self.drain.or(other.drain),
             inputs: self.inputs.or(other.inputs),
+            refused: self.refused.or(other.refused),
             limits: self.limits.or(other.limits),
             log: self.log.or(other.log),
             verbose: self.verbose.or(other.verbose),
             quiet: self.quiet.or(other.quiet),
             on_certified: self.on_certified.or(other.on_certified),
+            on_refused: self.on_refused.or(other.on_refused),
         }
     }
 
@@ -294,6 +320,10 @@ impl Said {
         if !(1..=MOST_JOBS).contains(&jobs) {
             return Err(SettingsError::Jobs(jobs));
         }
+        let commands = self.commands.unwrap_or_else(|| USUAL_COMMANDS.max(2 * jobs));
+        if !(1..=MOST_COMMANDS).contains(&commands) {
+            return Err(SettingsError::Commands(commands));
+        }
         let machine_memory = memory_of_the_machine();
         let memory = self.memory.unwrap_or_else(|| ByteSize::b(machine_memory / 2).max(LEAST_MEMORY));
         if memory < LEAST_MEMORY {
@@ -318,6 +348,7 @@ impl Said {
             size: self.size,
             force: self.force.unwrap_or(false),
             jobs,
+            commands,
             memory,
             machine_memory,
             job_memory: self.job_memory.map(|memory| memory.as_u64()),
@@ -326,18 +357,22 @@ impl Said {
             recursive: self.recursive.unwrap_or(false),
             drain: self.drain.unwrap_or(false),
             inputs: self.inputs.unwrap_or_default(),
+            refused: self.refused.unwrap_or_default().0,
             limits: self.limits.unwrap_or_default().or_default(),
             log: self.log.unwrap_or_default(),
             verbose: self.verbose.unwrap_or(0),
             quiet: self.quiet.unwrap_or(false),
-            on_certified: hooks(self.on_certified.unwrap_or_default())?,
+            on_certified: hooks(self.on_certified, Occasion::Certified)?,
+            on_refused: hooks(self.on_refused, Occasion::Refused)?,
         })
     }
 }
 
-fn hooks(said: Vec<OnCertified>) -> Result<Vec<Hook>, SettingsError> {
-    let check = |(i, hook)| Hook::new(hook).map_err(|error| SettingsError::OnCertified { table: i + 1, error });
-    said.into_iter().enumerate().map(check).collect()
+fn hooks(said: Option<Vec<CommandSaid>>, occasion: Occasion) -> Result<Vec<Hook>, SettingsError> {
+    let check = |(i, command)| {
+        Hook::new(command, occasion).map_err(|error| SettingsError::Command { occasion, table: i + 1, error })
+    };
+    said.unwrap_or_default().into_iter().enumerate().map(check).collect()
 }
 
 #[cfg(test)]
@@ -387,12 +422,12 @@ mod tests {
     fn commands_are_said_in_the_file_and_checked_at_once() {
         let read = |text: &str| toml::from_str::<Said>(text);
         let said = read(
-            "order = 1\n[[on_certified]]\ncommand = [\"gmsh\", \"{remesh}\"]\ntime-limit = 600\n\
+            "order = 1\n[[on_certified]]\ncommand = [\"gmsh\", \"{remesh}\"]\ntime-limit = 60\n\
              [[on_certified]]\ncommand = [\"a\"]\n",
         );
         let settings = Said::default().or(said.expect("valid")).check().expect("in range");
         let limits: Vec<f64> = settings.on_certified.iter().map(|h| h.configured().time_limit).collect();
-        assert_eq!(limits, [600.0, 3600.0]);
+        assert_eq!(limits, [60.0, 600.0]);
         for wrong in ["command = \"gmsh\"", "command = [1]", "time-limit = 1", "command = [\"a\"]\ntime_limit = 1"] {
             assert!(read(&format!("[[on_certified]]\n{wrong}")).is_err(), "{wrong}");
         }
@@ -411,6 +446,29 @@ mod tests {
             let said = read(&format!("[[on_certified]]\ncommand = [\"first\"]\n[[on_certified]]\n{text}"));
             let told = said.expect("well-formed").check().expect_err(text).to_string();
             assert!(told.starts_with("[[on_certified]], table 2: ") && told.contains(expected), "{told}");
+        }
+        let refused = read("[[on_refused]]\ncommand = [\"mail\", \"{code}\", \"{input}\"]").expect("well-formed");
+        assert_eq!(refused.check().expect("in range").on_refused.len(), 1);
+        let wrong = read("[[on_refused]]\ncommand = [\"gmsh\", \"{remesh}\"]").expect("well-formed");
+        let told = wrong.check().expect_err("there is no such file").to_string();
+        assert!(told.starts_with("[[on_refused]], table 1: command, part 2 (\"{remesh}\"): "), "{told}");
+    }
+
+    #[test]
+    fn commands_run_beside_each_other_even_where_there_is_one_processor() {
+        let commands = |text: &str| toml::from_str::<Said>(text).expect("valid").check().map(|s| s.commands).ok();
+        assert_eq!(["jobs = 1", "jobs = 3", "jobs = 1024"].map(commands), [Some(4), Some(6), Some(2048)]);
+        assert_eq!(["jobs = 3\ncommands = 1", "commands = 0", "commands = 2049"].map(commands), [Some(1), None, None]);
+    }
+
+    #[test]
+    fn refused_inputs_are_never_deleted() {
+        let read = |text: &str| toml::from_str::<Said>(text);
+        let moved = read("refused = \"move:bad\"").expect("valid").check().expect("in range").refused;
+        assert_eq!(moved, Inputs::Move("bad".into()));
+        for wrong in ["delete", "move:", "bad"] {
+            let told = read(&format!("refused = \"{wrong}\"")).expect_err(wrong).to_string();
+            assert!(told.contains("is none of keep and move:DIR"), "{told}");
         }
     }
 }

@@ -45,14 +45,16 @@ fn the_example_works_as_it_is_and_switched_on_and_shows_the_defaults() {
         max_triangles: all.max_triangles,
         size: all.size,
         jobs: all.jobs,
+        commands: all.commands,
         memory: all.memory,
         job_memory: all.job_memory,
         job_time: all.job_time,
         on_certified: all.on_certified.clone(),
+        on_refused: all.on_refused.clone(),
         ..as_it_is
     };
     assert_eq!(all, without_default);
-    assert_eq!(all.on_certified.len(), 2);
+    assert_eq!((all.on_certified.len(), all.on_refused.len()), (2, 1));
     let out = Out::new();
     let config = root().join("packaging/planish.toml");
     let ended = out.run(&[&fixture("disk.stl")], &["--config", config.to_str().expect("UTF-8")]);

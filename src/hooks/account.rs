@@ -1,9 +1,11 @@
 //! hooks.json: what the commands did. The schema is in docs/hooks.schema.json; within version 1 it only grows.
 
 use super::Hook;
-use super::process::{End, Ended, Limits, Tail};
-use crate::settings::OnCertified;
+use super::output::Tail;
+use super::process::{End, Ended, Limits};
+use crate::settings::CommandSaid;
 use serde::{Deserialize, Serialize};
+use std::os::unix::process::ExitStatusExt;
 
 /// The version of the schema.
 pub const SCHEMA: u32 = 1;
@@ -83,7 +85,7 @@ impl Account {
 
 impl Ran {
     fn is_of(&self, hook: &Hook) -> bool {
-        let OnCertified { command, time_limit } = hook.configured();
+        let CommandSaid { command, time_limit } = hook.configured();
         (&self.configured, self.time_limit) == (command, *time_limit)
     }
 
@@ -166,12 +168,6 @@ fn message(outcome: Outcome, ended: &Ended, limits: Limits) -> Option<String> {
     }
 }
 
-#[cfg(unix)]
 fn signal(ended: &Ended) -> Option<i32> {
-    ended.status.and_then(|s| std::os::unix::process::ExitStatusExt::signal(&s))
-}
-
-#[cfg(not(unix))]
-fn signal(_: &Ended) -> Option<i32> {
-    None
+    ended.status.and_then(|s| s.signal())
 }

@@ -1,23 +1,32 @@
-//! Commands that run after an input is certified: `[[on_certified]]` of planish.toml.
+//! Commands that run when an input is done: `[[on_certified]]` and `[[on_refused]]` of planish.toml.
 //!
 //! The commands of a result are a chain: they run one after another, in the result folder, and where one does not
 //! succeed the ones after it are skipped. What they did stands in `hooks.json` beside the report (docs/hooks.md). A
 //! chain that was broken off because its result is no longer wanted leaves no account and runs again, from its
 //! beginning, at the next opportunity: commands run **at least once** for each report, and again when they are
-//! configured anew; a failure is not repeated.
+//! configured anew; a failure is not repeated. Nor is a chain one of whose commands takes the result away: there is no
+//! place for its account, and what was taken would only be made again for it.
+//!
+//! That the system has no process or handle to spare at the moment says nothing about a command: the chain is broken
+//! off, too.
 //!
 //! No shell is involved: a file name is one argument, whatever it holds. What a command leaves running in its process
-//! group is ended with it.
+//! group is ended with it, and what a killed planish has left running is ended before anything runs again
+//! ([`end_those_of`]).
 
 mod account;
+mod orphans;
+mod output;
 mod process;
 mod template;
 
+use crate::passing;
 use crate::report;
-use crate::settings::OnCertified;
+use crate::settings::CommandSaid;
 use crate::shown::{printable, printable_json, shown};
 use crate::stages::read_file;
 pub use account::{Account, Outcome, Ran, SCHEMA};
+pub use orphans::end_those_of;
 use process::{Limits, Trouble};
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -36,10 +45,29 @@ const OUTPUT: u64 = 256 << 20;
 /// How long a command may take to end when it is asked to (SIGTERM), before it is killed.
 const GRACE: Duration = Duration::from_secs(2);
 
+/// When commands run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Occasion {
+    /// An input is certified.
+    Certified,
+    /// An input is refused, or failed.
+    Refused,
+}
+
+/// As the tables of planish.toml are named.
+impl std::fmt::Display for Occasion {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Certified => "on_certified",
+            Self::Refused => "on_refused",
+        })
+    }
+}
+
 /// A command, checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hook {
-    configured: OnCertified,
+    configured: CommandSaid,
     arguments: Vec<Template>,
 }
 
@@ -68,17 +96,18 @@ pub enum HookRefused {
 }
 
 impl Hook {
-    /// Checks a command.
+    /// Checks a command for this occasion.
     ///
     /// # Errors
     /// [`HookRefused`] for what can never run.
-    pub fn new(configured: OnCertified) -> Result<Self, HookRefused> {
-        let OnCertified { command, time_limit } = &configured;
+    pub fn new(configured: CommandSaid, occasion: Occasion) -> Result<Self, HookRefused> {
+        let CommandSaid { command, time_limit } = &configured;
         if !(*time_limit > 0.0 && time_limit.is_finite()) {
             return Err(HookRefused::TimeLimit(*time_limit));
         }
         let parse = |(i, text): (usize, &String)| {
-            Template::parse(text).map_err(|error| HookRefused::Argument { part: i + 1, text: text.clone(), error })
+            let refused = |error| HookRefused::Argument { part: i + 1, text: text.clone(), error };
+            Template::parse(text, occasion).map_err(refused)
         };
         let arguments = command.iter().enumerate().map(parse).collect::<Result<Vec<_>, _>>()?;
         match arguments.first() {
@@ -89,7 +118,7 @@ impl Hook {
     }
 
     /// The command as it is configured.
-    pub fn configured(&self) -> &OnCertified {
+    pub fn configured(&self) -> &CommandSaid {
         &self.configured
     }
 
@@ -103,6 +132,7 @@ impl Hook {
 pub struct Target {
     input: PathBuf,
     folder: PathBuf,
+    code: String,
 }
 
 impl Target {
@@ -112,7 +142,12 @@ impl Target {
     /// [`HookError`] where a path is empty, or relative to a folder that is gone.
     pub fn new(input: &Path, folder: &Path) -> Result<Self, HookError> {
         let absolute = |path: &Path| std::path::absolute(path).map_err(at(path));
-        Ok(Self { input: absolute(input)?, folder: absolute(folder)? })
+        Ok(Self { input: absolute(input)?, folder: absolute(folder)?, code: String::new() })
+    }
+
+    /// The result of an input that was refused, or failed, for this reason.
+    pub fn with_code(self, code: String) -> Self {
+        Self { code, ..self }
     }
 
     /// The input file, by its absolute path.
@@ -123,6 +158,16 @@ impl Target {
     /// The result folder, by its absolute path.
     pub fn folder(&self) -> &Path {
         &self.folder
+    }
+
+    /// The code of the reason; empty for a certified input.
+    pub fn code(&self) -> &str {
+        &self.code
+    }
+
+    /// Whether the result is where it was published.
+    pub fn is_there(&self) -> bool {
+        self.report().is_some()
     }
 
     /// The hash of the report.
@@ -138,7 +183,7 @@ impl Target {
 pub enum HookError {
     /// The system refuses.
     #[error(
-        "commands after certification: {}: {error}; check that the disk has room and the folder may be written",
+        "commands cannot run: {}: {error}; check that the disk has room and the folder may be written",
         shown(.path)
     )]
     Io {
@@ -148,8 +193,19 @@ pub enum HookError {
         error: io::Error,
     },
     /// There is no result.
-    #[error("commands after certification: {} holds no report.json that can be read; process its input again", shown(.0))]
+    #[error("commands cannot run: {} holds no report.json that can be read; process its input again", shown(.0))]
     NoReport(PathBuf),
+    /// The system has no room for another process at the moment.
+    #[error(
+        "command {} cannot be started now: {error}; it runs at the next opportunity: end other processes, or raise \
+         their limits (`ulimit -u`, `ulimit -n`, TasksMax=)", printable(.program)
+    )]
+    NoRoom {
+        /// The program.
+        program: String,
+        /// Why.
+        error: io::Error,
+    },
     /// The account does not become JSON.
     #[error("hooks.json cannot be written: {0}; that is a fault of planish")]
     Account(serde_json::Error),
@@ -167,51 +223,53 @@ pub fn account(target: &Target) -> Option<Account> {
 }
 
 /// Whether `hooks` have not run for the report that is in the folder, or are configured otherwise since. A chain that
-/// failed is not due. Whoever asks knows that the result is certified.
+/// failed is not due. Whoever asks knows that these are the commands for such a result.
 pub fn are_due(hooks: &[Hook], target: &Target) -> bool {
     let Some(report) = target.report().filter(|_| !hooks.is_empty()) else { return false };
     account(target).is_none_or(|a| !a.is_of(hooks, &report))
 }
 
-/// Runs `hooks` for a certified result and writes the account beside its report. `staging` is a folder on the same
-/// file system, for outputs; `wanted` is asked all the time whether to go on.
+/// What became of a chain of commands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Chain {
+    /// It ran to its end, be it a bad one; its account is written beside the report.
+    Over(Account),
+    /// It is to run again: the result is no longer wanted, or another one is in its place. There is no account.
+    BrokenOff,
+    /// The result was taken away while this command ran (1 is the first). There is no account.
+    Taken(usize),
+}
+
+/// Runs `hooks` on a result and writes the account beside its report. `staging` is the staging folder of this process,
+/// on the same file system; `wanted` is asked all the time whether to go on.
 ///
-/// None where no account is written: there are no hooks, or the result is no longer wanted (or no longer there, or
-/// another one). Blocks as long as the commands take, but not much longer than their time limits.
+/// Blocks as long as the commands take, but not much longer than their time limits.
 ///
 /// # Errors
 /// [`HookError`] where the system fails. A command that fails is none: see [`Account::failure`].
-pub fn run(
-    hooks: &[Hook],
-    target: &Target,
-    staging: &Path,
-    wanted: &dyn Fn() -> bool,
-) -> Result<Option<Account>, HookError> {
-    if hooks.is_empty() {
-        return Ok(None);
-    }
+pub fn run(hooks: &[Hook], target: &Target, staging: &Path, wanted: &dyn Fn() -> bool) -> Result<Chain, HookError> {
     let report = target.report().ok_or_else(|| HookError::NoReport(target.folder.clone()))?;
     let mut commands: Vec<Ran> = Vec::new();
     for hook in hooks {
-        let may_run = commands.iter().all(|c| c.outcome == Outcome::Succeeded);
-        let ran = if may_run {
-            run_one(hook, target, staging, wanted)?
-        } else {
-            Some(Ran::skipped(hook, told(&program(hook, target))))
-        };
-        let Some(ran) = ran else {
-            tracing::debug!("commands broken off: the result is no longer wanted");
-            return Ok(None);
+        if commands.iter().any(|c| c.outcome != Outcome::Succeeded) {
+            commands.push(Ran::skipped(hook, told(&program(hook, target))));
+            continue;
+        }
+        let ran = run_one(hook, target, staging, wanted)?;
+        let now = target.report();
+        // What nobody wants any more is broken off, wherever its result is.
+        if ran.is_some() && now.is_none() {
+            return Ok(Chain::Taken(commands.len() + 1));
+        }
+        let Some(ran) = ran.filter(|_| now.as_ref() == Some(&report)) else {
+            tracing::debug!("commands broken off: the result is no longer wanted, or another one is in its place");
+            return Ok(Chain::BrokenOff);
         };
         commands.push(ran);
     }
     let account = Account { schema: SCHEMA, report, commands };
-    // Another process may have published another result meanwhile.
-    if target.report().as_ref() != Some(&account.report) {
-        return Ok(None);
-    }
     write(&account, target, staging)?;
-    Ok(Some(account))
+    Ok(Chain::Over(account))
 }
 
 /// Runs a command; none where it was not, or is no longer, wanted.
@@ -222,15 +280,25 @@ fn run_one(hook: &Hook, target: &Target, staging: &Path, wanted: &dyn Fn() -> bo
     let mut command = program(hook, target);
     let words = told(&command);
     tracing::debug!(command = ?words, "command begins");
-    let ran = match process::run(&mut command, staging, hook.limits(), wanted) {
+    orphans::mark(&mut command, staging).map_err(at(staging))?;
+    let ran = match process::run(&mut command, hook.limits(), wanted) {
         Ok(ended) => Ran::ended(hook, words, ended, hook.limits()),
+        Err(Trouble::Start(error)) if is_for_want_of_room(&error) => {
+            return Err(HookError::NoRoom { program: words[0].clone(), error });
+        }
         Err(Trouble::Start(error)) => Some(Ran::not_started(hook, words, &error)),
-        Err(Trouble::System(error)) => return Err(at(staging)(error)),
+        Err(Trouble::System(error)) => return Err(at(&target.folder)(error)),
     };
     if let Some(Ran { command, message: Some(message), .. }) = &ran {
         tracing::warn!(?command, "command did not succeed: {}", printable(message));
     }
     Ok(ran)
+}
+
+/// Whether a program could not be started for a reason that passes: it says nothing about the program. A file that
+/// somebody still writes cannot be started, either.
+fn is_for_want_of_room(error: &io::Error) -> bool {
+    passing::passes(error) || error.kind() == io::ErrorKind::ExecutableFileBusy
 }
 
 /// The command for a result.
@@ -261,5 +329,5 @@ fn write(account: &Account, target: &Target, staging: &Path) -> Result<(), HookE
     File::open(&target.folder).and_then(|f| f.sync_all()).map_err(at(&target.folder))
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests;

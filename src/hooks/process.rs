@@ -1,23 +1,22 @@
 //! One command, watched until it is over.
 //!
-//! Its output goes to files, not to pipes: a child that it leaves behind with a pipe open would keep planish waiting.
-//! It leads a process group of its own, so that what it started ends with it, and so that the terminal's Ctrl-C
-//! reaches planish alone, which decides. A process that leaves the group (`setsid`) is on its own.
+//! What it prints is read as it comes ([`super::output`]): neither does it wait for planish, nor planish for a child
+//! that it leaves behind with its output open. It leads a process group of its own, so that what it started ends with
+//! it, and so that the terminal's Ctrl-C reaches planish alone, which decides. A process that leaves the group
+//! (`setsid`) is on its own, and so is its output.
 
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
-use std::path::Path;
+use super::output::{Outputs, Tail};
+use rustix::process::{Pid, Signal, kill_process_group, test_kill_process_group};
+use std::io;
+use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// How often a command is looked at.
+/// How often a command that prints nothing is looked at.
 const POLL: Duration = Duration::from_millis(20);
 
 /// How long a killed process may take to be gone. The system delays it only where it hangs in a device.
 const DYING: Duration = Duration::from_secs(5);
-
-/// This much of the end of an output is kept.
-const TAIL: u64 = 64 << 10;
 
 /// What a command may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,15 +42,6 @@ pub enum End {
     Unwanted,
 }
 
-/// The end of an output.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Tail {
-    /// The text; what is no UTF-8 is replaced.
-    pub text: String,
-    /// Whether something before it is missing.
-    pub truncated: bool,
-}
-
 /// What became of a command.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ended {
@@ -72,42 +62,24 @@ pub struct Ended {
 pub enum Trouble {
     /// It does not start.
     Start(io::Error),
-    /// Its output has no place, or it cannot be watched.
+    /// It cannot be watched.
     System(io::Error),
 }
 
-/// Runs a command, with its output in temporary files in `staging`, until it ends, breaks a limit, or is no longer
-/// `wanted`.
-pub fn run(command: &mut Command, staging: &Path, limits: Limits, wanted: &dyn Fn() -> bool) -> Result<Ended, Trouble> {
-    let outputs = [output(staging).map_err(Trouble::System)?, output(staging).map_err(Trouble::System)?];
-    let [stdout, stderr] = &outputs;
-    command.stdin(Stdio::null());
-    command.stdout(stdout.as_file().try_clone().map_err(Trouble::System)?);
-    command.stderr(stderr.as_file().try_clone().map_err(Trouble::System)?);
+/// Runs a command until it ends, breaks a limit, or is no longer `wanted`.
+pub fn run(command: &mut Command, limits: Limits, wanted: &dyn Fn() -> bool) -> Result<Ended, Trouble> {
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let started = Instant::now();
     let mut group = Group::start(command).map_err(Trouble::Start)?;
-    let end = watch(&mut group, &outputs, limits, wanted);
-    group.end(limits.grace);
-    Ok(Ended {
-        end: end.map_err(Trouble::System)?,
-        status: group.status,
-        seconds: started.elapsed().as_secs_f64(),
-        stdout: tail(stdout.as_file()).map_err(Trouble::System)?,
-        stderr: tail(stderr.as_file()).map_err(Trouble::System)?,
-    })
+    let mut outputs = Outputs::default();
+    let watched = outputs.take(&mut group.child).and_then(|()| watch(&mut group, &mut outputs, limits, wanted));
+    group.end(limits.grace, &mut outputs);
+    let end = watched.and_then(|end| outputs.read_rest().map(|()| end)).map_err(Trouble::System)?;
+    let (stdout, stderr) = outputs.close();
+    Ok(Ended { end, status: group.status, seconds: started.elapsed().as_secs_f64(), stdout, stderr })
 }
 
-/// A file for output. It is always written at its end, whoever else writes to it.
-fn output(staging: &Path) -> io::Result<tempfile::NamedTempFile> {
-    tempfile::Builder::new().prefix("output-").append(true).tempfile_in(staging)
-}
-
-fn watch(
-    group: &mut Group,
-    outputs: &[tempfile::NamedTempFile],
-    limits: Limits,
-    wanted: &dyn Fn() -> bool,
-) -> io::Result<End> {
+fn watch(group: &mut Group, outputs: &mut Outputs, limits: Limits, wanted: &dyn Fn() -> bool) -> io::Result<End> {
     let started = Instant::now();
     loop {
         if group.has_exited()? {
@@ -119,39 +91,30 @@ fn watch(
         if started.elapsed().as_secs_f64() >= limits.seconds {
             return Ok(End::TimedOut);
         }
-        for file in outputs {
-            if file.as_file().metadata()?.len() > limits.output {
-                return Ok(End::TooMuchOutput);
-            }
+        if outputs.longest() > limits.output {
+            return Ok(End::TooMuchOutput);
         }
-        std::thread::sleep(POLL);
+        outputs.wait(POLL)?;
     }
 }
 
-/// Whether something comes true in time.
-fn within(time: Duration, mut is_true: impl FnMut() -> bool) -> bool {
+/// Whether something comes true in time. What is printed meanwhile is read: who must print to end can.
+fn within(time: Duration, outputs: &mut Outputs, mut is_true: impl FnMut() -> bool) -> bool {
     let started = Instant::now();
     while !is_true() {
         if started.elapsed() >= time {
             return false;
         }
-        std::thread::sleep(POLL);
+        if outputs.wait(POLL).is_err() {
+            std::thread::sleep(POLL);
+        }
     }
     true
 }
 
-/// The end of a file, cut between characters where it is text.
-fn tail(mut file: &File) -> io::Result<Tail> {
-    let begin = file.metadata()?.len().saturating_sub(TAIL);
-    file.seek(SeekFrom::Start(begin))?;
-    let mut bytes = Vec::new();
-    file.take(TAIL).read_to_end(&mut bytes)?;
-    let continues = |b: &&u8| **b & 0xC0 == 0x80;
-    let cut = if begin > 0 { bytes.iter().take(3).take_while(continues).count() } else { 0 };
-    Ok(Tail { text: String::from_utf8_lossy(&bytes[cut..]).into_owned(), truncated: begin > 0 })
-}
-
-/// A process and those that it started.
+/// A process and those that it started. Signals go to the group by its number. The system gives that number to nobody
+/// else while the group has members, and after that not before it has used all others: more than can happen between two
+/// looks.
 struct Group {
     child: Child,
     status: Option<ExitStatus>,
@@ -159,9 +122,7 @@ struct Group {
 
 impl Group {
     fn start(command: &mut Command) -> io::Result<Self> {
-        #[cfg(unix)]
-        std::os::unix::process::CommandExt::process_group(command, 0);
-        Ok(Self { child: command.spawn()?, status: None })
+        Ok(Self { child: command.process_group(0).spawn()?, status: None })
     }
 
     /// Whether the first process is over; then it is reaped.
@@ -178,80 +139,48 @@ impl Group {
     }
 
     /// Ends all of it: kindly first, and by force after `grace`.
-    fn end(&mut self, grace: Duration) {
+    fn end(&mut self, grace: Duration, outputs: &mut Outputs) {
         if self.is_over() {
             return;
         }
-        self.ask_to_end();
-        if within(grace, || self.is_over()) {
+        self.signal(Signal::TERM);
+        if within(grace, outputs, || self.is_over()) {
             return;
         }
-        self.kill();
-        if !within(DYING, || self.has_exited().unwrap_or(false)) {
+        self.signal(Signal::KILL);
+        if !within(DYING, outputs, || self.has_exited().unwrap_or(false)) {
             tracing::warn!(process = self.child.id(), "a command does not even end when it is killed: left behind");
         }
     }
-}
 
-/// Signals go to the group by its number. The system gives that number to nobody else while the group has members,
-/// and after that not before it has used all others: more than can happen between two looks.
-#[cfg(unix)]
-impl Group {
-    fn id(&self) -> Option<rustix::process::Pid> {
-        i32::try_from(self.child.id()).ok().and_then(rustix::process::Pid::from_raw)
+    fn id(&self) -> Option<Pid> {
+        i32::try_from(self.child.id()).ok().and_then(Pid::from_raw)
     }
 
     /// Processes that planish may not signal count as gone.
     fn has_members(&self) -> bool {
-        self.id().is_some_and(|id| rustix::process::test_kill_process_group(id).is_ok())
-    }
-
-    fn ask_to_end(&self) {
-        self.signal(rustix::process::Signal::TERM);
-    }
-
-    fn kill(&self) {
-        self.signal(rustix::process::Signal::KILL);
+        self.id().is_some_and(|id| test_kill_process_group(id).is_ok())
     }
 
     /// That the group has ended by itself meanwhile is no error.
-    fn signal(&self, signal: rustix::process::Signal) {
+    fn signal(&self, signal: Signal) {
         if let Some(id) = self.id() {
-            let _ = rustix::process::kill_process_group(id, signal);
+            let _ = kill_process_group(id, signal);
         }
     }
 }
 
-/// Elsewhere there are no groups: the first process alone is ended.
-#[cfg(not(unix))]
-impl Group {
-    fn has_members(&self) -> bool {
-        false
-    }
-
-    fn ask_to_end(&mut self) {
-        self.kill();
-    }
-
-    /// That it has ended by itself meanwhile is no error.
-    fn kill(&mut self) {
-        let _ = self.child.kill();
-    }
-}
-
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
+    use super::super::output::TAIL;
     use super::*;
+    use std::path::Path;
 
     const LIMITS: Limits = Limits { seconds: 60.0, output: 1 << 20, grace: Duration::from_millis(200) };
 
-    /// Runs a script in `folder`; outputs go to the folder `staging` in it.
+    /// Runs a script in `folder`.
     fn sh(folder: &Path, script: &str, limits: Limits, wanted: &dyn Fn() -> bool) -> Ended {
-        let staging = folder.join("staging");
-        std::fs::create_dir(&staging).expect("made");
-        let ended = run(Command::new("sh").args(["-c", script]).current_dir(folder), &staging, limits, wanted);
-        assert_eq!(std::fs::read_dir(&staging).expect("a folder").count(), 0, "nothing is left");
-        ended.expect("starts")
+        run(Command::new("sh").args(["-c", script]).current_dir(folder), limits, wanted).expect("starts")
     }
 
     /// Whether the process whose number is in a file is gone (or reaped by nobody, where the machine has no init).
@@ -260,6 +189,10 @@ mod tests {
         let state = std::fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
         let id = rustix::process::Pid::from_raw(id).expect("not 0");
         state.contains(") Z ") || rustix::process::test_kill_process(id).is_err()
+    }
+
+    fn goes(file: &Path) -> bool {
+        within(Duration::from_secs(20), &mut Outputs::default(), || is_gone(file))
     }
 
     #[test]
@@ -278,7 +211,7 @@ mod tests {
         let script = "i=0; while [ $i -lt 5000 ]; do printf 'xxxxxxxxxxxxxxxxx€€€'; i=$((i+1)); done; printf end";
         let ended = sh(folder.path(), script, LIMITS, &|| true);
         let Tail { text, truncated } = ended.stdout;
-        assert!(truncated && text.len() as u64 > TAIL - 3 && text.len() as u64 <= TAIL, "{}", text.len());
+        assert!(truncated && text.len() > TAIL - 3 && text.len() <= TAIL, "{}", text.len());
         assert!(text.ends_with("€€€end") && !text.contains('\u{fffd}'));
     }
 
@@ -289,8 +222,7 @@ mod tests {
         let ended = sh(folder.path(), script, Limits { seconds: 0.5, ..LIMITS }, &|| true);
         assert_eq!(ended.end, End::TimedOut);
         assert!(ended.status.is_some_and(|s| !s.success()) && ended.seconds < 30.0, "{ended:?}");
-        let reaped = within(Duration::from_secs(20), || is_gone(&folder.path().join("child")));
-        assert!(reaped, "the grandchild lives");
+        assert!(goes(&folder.path().join("child")), "the grandchild lives");
     }
 
     #[test]
@@ -328,16 +260,45 @@ mod tests {
         let ended = sh(folder.path(), "sleep 1000 & echo $! > child", LIMITS, &|| true);
         assert_eq!((ended.end, ended.status.map(|s| s.success())), (End::Exited, Some(true)));
         assert!(ended.seconds < 30.0);
-        assert!(within(Duration::from_secs(20), || is_gone(&folder.path().join("child"))), "the child lives");
+        assert!(goes(&folder.path().join("child")), "the child lives");
+    }
+
+    /// Nothing is left that it could fill: neither a file nor a pipe that somebody reads.
+    #[test]
+    fn a_child_that_has_escaped_and_prints_without_end_keeps_nobody_waiting_and_ends() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let script = "setsid sh -c 'echo $$ > child; while :; do echo x; done' & until test -s child; do :; done";
+        let ended = sh(folder.path(), script, Limits { output: u64::MAX, ..LIMITS }, &|| true);
+        assert_eq!((ended.end, ended.status.map(|s| s.success())), (End::Exited, Some(true)));
+        assert!(ended.seconds < 30.0);
+        assert!(goes(&folder.path().join("child")), "the child prints on");
+    }
+
+    /// A command that prints much gets on as fast as it is read: never does it wait for the next look.
+    #[test]
+    fn nobody_who_prints_is_slowed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let limits = Limits { output: 1 << 30, ..LIMITS };
+        let ended = sh(folder.path(), "head -c 268435456 /dev/zero", limits, &|| true);
+        // 4096 chunks: with a look for each, 80 seconds.
+        assert!(ended.end == End::Exited && ended.stdout.truncated && ended.seconds < 20.0, "{}", ended.seconds);
+    }
+
+    /// Its last words do not fit into a pipe.
+    #[test]
+    fn what_prints_much_before_it_ends_may() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let script = "trap 'head -c 500000 /dev/zero; echo end; exit 7' TERM; sleep 1000 & wait";
+        let limits = Limits { seconds: 0.5, grace: Duration::from_secs(30), ..LIMITS };
+        let ended = sh(folder.path(), script, limits, &|| true);
+        assert_eq!((ended.end, ended.status.and_then(|s| s.code())), (End::TimedOut, Some(7)));
+        assert!(ended.stdout.text.ends_with("\0end\n") && ended.seconds < 30.0);
     }
 
     #[test]
     fn what_cannot_start_is_told() {
         let folder = tempfile::tempdir().expect("a folder");
-        let run = |command: &mut Command| run(command, folder.path(), LIMITS, &|| true);
-        assert!(matches!(run(&mut Command::new("no-such-program")), Err(Trouble::Start(_))));
-        let staging = folder.path().join("no/staging");
-        let nowhere = super::run(&mut Command::new("true"), &staging, LIMITS, &|| true);
-        assert!(matches!(nowhere, Err(Trouble::System(_))));
+        let run = |program| run(Command::new(program).current_dir(folder.path()), LIMITS, &|| true);
+        assert!(matches!(run("no-such-program"), Err(Trouble::Start(_))));
     }
 }

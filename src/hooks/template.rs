@@ -3,11 +3,11 @@
 //! Paths are filled in as the system knows them: names that are no UTF-8 arrive unharmed. What is filled in is never
 //! looked at again, so braces in names mean nothing.
 
-use super::Target;
+use super::{Occasion, Target};
 use crate::formats::gmsh;
 use crate::report;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// What a placeholder stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,16 +18,19 @@ enum Place {
     Name,
     /// The result folder.
     Folder,
+    /// Why the input is refused or failed.
+    Code,
     /// A file of the result.
     File(&'static str),
 }
 
 /// All placeholders.
-const PLACES: [(&str, Place); 9] = [
+const PLACES: [(&str, Place); 10] = [
     ("input", Place::Input),
     ("name", Place::Name),
     ("folder", Place::Folder),
     ("report", Place::File(report::FILE)),
+    ("code", Place::Code),
     ("surface", Place::File("surface.vtu")),
     ("param", Place::File("param.vtu")),
     ("seams", Place::File("seams.vtp")),
@@ -35,12 +38,31 @@ const PLACES: [(&str, Place); 9] = [
     ("remesh", Place::File(gmsh::REMESH)),
 ];
 
+impl Place {
+    /// Whether there is something for which it stands.
+    fn is_there(self, occasion: Occasion) -> bool {
+        match (self, occasion) {
+            (Self::Input | Self::Name | Self::Folder, _) => true,
+            (Self::Code, occasion) => occasion == Occasion::Refused,
+            (Self::File(file), occasion) => occasion == Occasion::Certified || file == report::FILE,
+        }
+    }
+
+    /// Whether it stands for an absolute path.
+    fn is_path(self) -> bool {
+        !matches!(self, Self::Name | Self::Code)
+    }
+}
+
 /// Why an argument is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TemplateError {
     /// A placeholder that does not exist.
-    #[error("{{{0}}} is no placeholder; there are {list}, and {{{{ and }}}} for the braces themselves", list = all())]
-    Unknown(String),
+    #[error("{{{0}}} is no placeholder; there are {list}, and {{{{ and }}}} for the braces themselves", list = all(.1))]
+    Unknown(String, Occasion),
+    /// A placeholder for something that such a result does not have.
+    #[error("{{{0}}} stands for nothing in [[{1}]]; there are {list}", list = all(.1))]
+    Missing(String, Occasion),
     /// A brace without its partner.
     #[error("the brace at character {0} has no partner; write {{{{ or }}}} for a brace itself")]
     Unbalanced(usize),
@@ -49,9 +71,10 @@ pub enum TemplateError {
     Zero,
 }
 
-/// The names of all placeholders, for people.
-fn all() -> String {
-    PLACES.map(|(name, _)| format!("{{{name}}}")).join(" ")
+/// The names of all placeholders that there are, for people.
+fn all(occasion: &Occasion) -> String {
+    let there = PLACES.iter().filter(|(_, place)| place.is_there(*occasion));
+    there.map(|(name, _)| format!("{{{name}}}")).collect::<Vec<_>>().join(" ")
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,7 +92,7 @@ impl Template {
     ///
     /// # Errors
     /// [`TemplateError`] for what is no placeholder.
-    pub fn parse(said: &str) -> Result<Self, TemplateError> {
+    pub fn parse(said: &str, occasion: Occasion) -> Result<Self, TemplateError> {
         if said.contains('\0') {
             return Err(TemplateError::Zero);
         }
@@ -87,7 +110,7 @@ impl Template {
             if name.contains('{') {
                 return Err(unbalanced());
             }
-            parts.extend([Part::Text(std::mem::take(&mut text)), Part::Place(place(name)?)]);
+            parts.extend([Part::Text(std::mem::take(&mut text)), Part::Place(place(name, occasion)?)]);
             rest = after;
         }
         parts.push(Part::Text(text + rest));
@@ -104,11 +127,11 @@ impl Template {
     pub fn is_relative_path(&self) -> bool {
         let begins_elsewhere = match self.0.first() {
             Some(Part::Text(text)) => !Path::new(text).is_absolute(),
-            Some(Part::Place(place)) => *place == Place::Name,
+            Some(Part::Place(place)) => !place.is_path(),
             None => false,
         };
         let separated = |p: &Part| matches!(p, Part::Text(t) if t.contains(std::path::is_separator));
-        let whole_path = |p: &Part| matches!(p, Part::Place(place) if *place != Place::Name);
+        let whole_path = |p: &Part| matches!(p, Part::Place(place) if place.is_path());
         begins_elsewhere && self.0.iter().any(|p| separated(p) || whole_path(p))
     }
 
@@ -125,17 +148,21 @@ impl Template {
     }
 }
 
-fn place(name: &str) -> Result<Place, TemplateError> {
-    let found = PLACES.iter().find(|(n, _)| *n == name).map(|(_, place)| *place);
-    found.ok_or_else(|| TemplateError::Unknown(name.to_owned()))
+fn place(name: &str, occasion: Occasion) -> Result<Place, TemplateError> {
+    match PLACES.iter().find(|(n, _)| *n == name) {
+        None => Err(TemplateError::Unknown(name.to_owned(), occasion)),
+        Some((_, place)) if !place.is_there(occasion) => Err(TemplateError::Missing(name.to_owned(), occasion)),
+        Some((_, place)) => Ok(*place),
+    }
 }
 
-fn value(place: Place, target: &Target) -> PathBuf {
+fn value(place: Place, target: &Target) -> OsString {
     match place {
-        Place::Input => target.input().to_owned(),
-        Place::Name => target.input().file_name().map(PathBuf::from).unwrap_or_default(),
-        Place::Folder => target.folder().to_owned(),
-        Place::File(file) => target.folder().join(file),
+        Place::Input => target.input().into(),
+        Place::Name => target.input().file_name().unwrap_or_default().to_owned(),
+        Place::Folder => target.folder().into(),
+        Place::Code => target.code().into(),
+        Place::File(file) => target.folder().join(file).into(),
     }
 }
 
@@ -144,11 +171,14 @@ mod tests {
     use super::*;
 
     fn filled(said: &str, input: &Path, folder: &Path) -> OsString {
-        let target = Target::new(input, folder).expect("paths");
-        Template::parse(said).expect("valid").fill(&target)
+        filled_where(Occasion::Certified, said, input, folder)
     }
 
-    #[cfg(unix)]
+    fn filled_where(occasion: Occasion, said: &str, input: &Path, folder: &Path) -> OsString {
+        let target = Target::new(input, folder).expect("paths").with_code("malformed".to_owned());
+        Template::parse(said, occasion).expect("valid").fill(&target)
+    }
+
     #[test]
     fn placeholders_become_paths() {
         let table = [
@@ -173,7 +203,6 @@ mod tests {
         assert_eq!(PLACES.iter().filter(|(n, _)| table.iter().any(|(s, _)| *s == format!("{{{n}}}"))).count(), 9);
     }
 
-    #[cfg(unix)]
     #[test]
     fn names_that_are_no_utf8_pass_unharmed() {
         use std::os::unix::ffi::{OsStrExt, OsStringExt};
@@ -184,10 +213,11 @@ mod tests {
 
     #[test]
     fn what_is_no_placeholder_is_told_with_its_place() {
-        let wrong = |said: &str| Template::parse(said).expect_err(said);
-        assert_eq!(wrong("{nam}"), TemplateError::Unknown("nam".to_owned()));
-        assert_eq!(wrong("{}"), TemplateError::Unknown(String::new()));
-        assert_eq!(wrong("{Name}"), TemplateError::Unknown("Name".to_owned()));
+        let wrong = |said: &str| Template::parse(said, Occasion::Certified).expect_err(said);
+        for name in ["nam", "", "Name"] {
+            let unknown = TemplateError::Unknown(name.to_owned(), Occasion::Certified);
+            assert_eq!(wrong(&format!("{{{name}}}")), unknown);
+        }
         for (said, at) in [("ü{name", 2), ("a}b", 2), ("{na{name}", 1), ("{name}}", 7), ("{{{", 3), ("}}}", 3)] {
             assert_eq!(wrong(said), TemplateError::Unbalanced(at), "{said}");
         }
@@ -197,11 +227,25 @@ mod tests {
         assert!(told.ends_with("{remesh}, and {{ and }} for the braces themselves"), "{told}");
     }
 
-    #[cfg(unix)]
+    #[test]
+    fn refused_inputs_have_a_code_and_no_files_but_the_report() {
+        let filled = |said| filled_where(Occasion::Refused, said, "/in/a.stl".as_ref(), "/out/a.stl".as_ref());
+        assert_eq!(filled("{code} {name} {input}"), "malformed a.stl /in/a.stl");
+        assert_eq!(filled("{folder} {report}"), "/out/a.stl /out/a.stl/report.json");
+        let wrong = |said: &str, occasion| Template::parse(said, occasion).expect_err(said).to_string();
+        for (name, place) in PLACES.iter().filter(|(_, place)| matches!(place, Place::File(f) if *f != report::FILE)) {
+            let told = wrong(&format!("x{{{name}}}"), Occasion::Refused);
+            assert!(told.contains("stands for nothing in [[on_refused]]; there are {input}"), "{place:?}: {told}");
+            assert!(told.ends_with("{input} {name} {folder} {report} {code}"), "{told}");
+        }
+        let told = wrong("{code}", Occasion::Certified);
+        assert!(told.starts_with("{code} stands for nothing in [[on_certified]]; there are {input}"), "{told}");
+    }
+
     #[test]
     fn relative_paths_are_told_from_names_and_full_paths() {
-        let relative = |said: &str| Template::parse(said).expect("valid").is_relative_path();
-        assert!(["./a.sh", "bin/a", "{name}/a", "x{folder}"].iter().all(|s| relative(s)));
+        let relative = |said: &str| Template::parse(said, Occasion::Refused).expect("valid").is_relative_path();
+        assert!(["./a.sh", "bin/a", "{name}/a", "{code}/a", "x{folder}"].iter().all(|s| relative(s)));
         assert!(!["gmsh", "/usr/bin/gmsh", "{folder}/a.sh", "{input}", ""].iter().any(|s| relative(s)));
     }
 }

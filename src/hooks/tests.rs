@@ -26,7 +26,7 @@ impl World {
         Self { folder, target }
     }
 
-    fn run_while(&self, hooks: &[Hook], wanted: &dyn Fn() -> bool) -> Result<Option<Account>, HookError> {
+    fn run_while(&self, hooks: &[Hook], wanted: &dyn Fn() -> bool) -> Result<Chain, HookError> {
         let staging = self.folder.path().join("staging");
         let ran = run(hooks, &self.target, &staging, wanted);
         assert_eq!(fs::read_dir(staging).expect("a folder").count(), 0, "nothing is left");
@@ -34,7 +34,8 @@ impl World {
     }
 
     fn run(&self, hooks: &[Hook]) -> Account {
-        let account = self.run_while(hooks, &|| true).expect("the system helps").expect("an account");
+        let chain = self.run_while(hooks, &|| true).expect("the system helps");
+        let Chain::Over(account) = chain else { panic!("an account is expected: {chain:?}") };
         let written = fs::read(self.target.folder().join(FILE)).expect("there");
         assert_eq!(serde_json::from_slice::<Account>(&written).expect("JSON"), account);
         account
@@ -43,7 +44,7 @@ impl World {
 
 fn hook(command: &[&str], time_limit: f64) -> Hook {
     let command = command.iter().map(ToString::to_string).collect();
-    Hook::new(OnCertified { command, time_limit }).expect("valid")
+    Hook::new(CommandSaid { command, time_limit }, Occasion::Certified).expect("valid")
 }
 
 fn sh(script: &str) -> Hook {
@@ -115,20 +116,47 @@ fn a_chain_that_is_no_longer_wanted_leaves_no_account_and_is_due_again() {
     let world = World::new();
     let begun = world.target.folder().join("begun");
     let hooks = [sh("true"), sh("touch begun; sleep 1000"), sh("touch after")];
-    assert!(world.run_while(&hooks, &|| !begun.exists()).expect("the system helps").is_none());
+    assert_eq!(world.run_while(&hooks, &|| !begun.exists()).expect("the system helps"), Chain::BrokenOff);
     assert!(begun.exists() && !world.target.folder().join("after").exists());
     assert!(!world.target.folder().join(FILE).exists() && are_due(&hooks, &world.target));
-    assert!(world.run_while(&hooks, &|| false).expect("the system helps").is_none());
+    assert_eq!(world.run_while(&hooks, &|| false).expect("the system helps"), Chain::BrokenOff);
 }
 
 #[test]
 fn a_result_that_was_replaced_meanwhile_gets_no_account() {
     let world = World::new();
-    assert!(world.run_while(&[sh("echo other > report.json")], &|| true).expect("the system helps").is_none());
+    let chain = world.run_while(&[sh("echo other > report.json")], &|| true).expect("the system helps");
+    assert_eq!(chain, Chain::BrokenOff);
     assert!(!world.target.folder().join(FILE).exists());
     fs::remove_file(world.target.folder().join(report::FILE)).expect("removed");
     assert!(matches!(world.run_while(&[sh("true")], &|| true), Err(HookError::NoReport(_))));
     assert!(!are_due(&[sh("true")], &world.target), "there is no result");
+}
+
+#[test]
+fn a_command_that_takes_the_result_ends_the_chain() {
+    let takes = ["mv report.json elsewhere", "mv ../part.stl ../elsewhere", "rm -r ../part.stl; exit 3"];
+    for script in takes {
+        let world = World::new();
+        let chain = world.run_while(&[sh("true"), sh(script), sh("touch ../after")], &|| true);
+        assert_eq!(chain.expect("the system helps"), Chain::Taken(2), "{script}");
+        assert!(!world.folder.path().join("out/after").exists(), "{script}");
+    }
+    let world = World::new();
+    let unwanted = || world.target.is_there();
+    let chain = world.run_while(&[sh("rm report.json; sleep 1000")], &unwanted).expect("the system helps");
+    assert_eq!(chain, Chain::BrokenOff, "planish stops, too: the next start does it again");
+}
+
+/// What the system has no room for now is no fault of the command.
+#[test]
+fn errors_that_pass_are_told_from_those_of_the_command() {
+    use rustix::io::Errno;
+    let passes = |errno: Errno| is_for_want_of_room(&errno.into());
+    let room = [Errno::AGAIN, Errno::MFILE, Errno::NFILE, Errno::NOMEM, Errno::TXTBSY];
+    assert!(room.into_iter().all(passes));
+    let faults = [Errno::NOENT, Errno::ACCESS, Errno::NOEXEC, Errno::ISDIR, Errno::TOOBIG, Errno::PERM];
+    assert!(!faults.into_iter().any(passes));
 }
 
 #[test]
@@ -159,5 +187,4 @@ fn commands_are_due_until_they_ran_for_this_report_as_they_are_configured() {
     assert!(!due(&[failing.clone(), other.clone()]) && due(&[other.clone(), failing.clone()]));
     fs::write(world.target.folder().join(FILE), "{").expect("written");
     assert!(due(&[failing, other]), "an account that cannot be read");
-    assert!(world.run_while(&[], &|| true).expect("the system helps").is_none());
 }

@@ -96,19 +96,44 @@ impl TryFrom<String> for Inputs {
     }
 }
 
-/// A command that runs after an input is certified: a table `[[on_certified]]` of planish.toml (see docs/hooks.md).
+/// What becomes of inputs of `planish watch` that are refused or failed, once all commands on them have succeeded. They
+/// are never deleted: nobody has what was in them.
+#[derive(Clone, Debug, PartialEq, Eq, Default, Deserialize)]
+#[serde(try_from = "String")]
+pub struct Refused(pub(super) Inputs);
+
+impl std::str::FromStr for Refused {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            Ok(Inputs::Delete) | Err(_) => Err(format!("{text} is none of keep and move:DIR")),
+            Ok(inputs) => Ok(Self(inputs)),
+        }
+    }
+}
+
+impl TryFrom<String> for Refused {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+/// A command that runs on a result: a table `[[on_certified]]` or `[[on_refused]]` of planish.toml (see docs/hooks.md).
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct OnCertified {
+pub struct CommandSaid {
     /// Program and arguments, with placeholders such as `{folder}`.
     pub command: Vec<String>,
-    /// Wall-clock seconds after which it is ended; an hour where nothing is said.
-    #[serde(rename = "time-limit", default = "an_hour")]
+    /// Wall-clock seconds after which it is ended; ten minutes where nothing is said.
+    #[serde(rename = "time-limit", default = "ten_minutes")]
     pub time_limit: f64,
 }
 
-fn an_hour() -> f64 {
-    3600.0
+fn ten_minutes() -> f64 {
+    600.0
 }
 
 /// What is too much for one input: the table `[limits]` of planish.toml. Files may come from anyone.

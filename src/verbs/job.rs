@@ -91,7 +91,7 @@ fn follow(conveyor: &Conveyor, parent: &Parent) -> End {
 
 fn ending(end: End) -> Ending {
     match end {
-        End::Done(_) | End::Later(..) | End::Outdated(_) | End::Unchained(..) => Ending::Made,
+        End::Done(_) | End::Later(..) | End::Outdated(_) | End::Taken(..) | End::Unchained(..) => Ending::Made,
         End::Changed | End::Unwanted | End::Same => Ending::Changed,
         End::Waiting(reason) => Ending::Waiting(reason),
         End::Again(reason) => Ending::Again(reason),

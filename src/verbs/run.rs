@@ -2,6 +2,7 @@
 
 use super::{Exit, complain, shown};
 use crate::conveyor::Conveyor;
+use crate::hooks;
 use crate::inputs;
 use crate::job::{Done, End, Job};
 use crate::outcome::Status;
@@ -36,6 +37,8 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     jobs.iter().for_each(|job| conveyor.submit(job.clone()));
     conveyor.close();
     let ends = follow(&jobs, &conveyor, &stop, settings.quiet);
+    // Where it was told twice to stop.
+    hooks::end_those_of(publisher.staging());
     publisher.close();
     let rows: Vec<Row> = jobs.iter().map(AsRef::as_ref).zip(&ends).collect();
     if !settings.quiet {
@@ -149,7 +152,9 @@ fn tell_trouble(job: &Job, end: &End) {
     let input = shown(&job.path);
     match end {
         End::Unwritten(error) => complain(&format!("{input}: {error}")),
-        End::Unchained(_, error) => complain(&format!("{input}: certified, but {error}")),
+        End::Taken(done, error) | End::Unchained(done, error) => {
+            complain(&format!("{input}: {}, but {error}", done.report.status));
+        }
         End::Changed => complain(&format!("{input}: it changed while it was read; try again")),
         End::Waiting(reason) | End::Again(reason) => complain(&format!("{input}: {}", reason.message)),
         End::Lost => complain(&format!("{input}: planish broke down; that is a fault of planish: please report it")),

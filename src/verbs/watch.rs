@@ -4,6 +4,7 @@ use super::{Exit, shown};
 use crate::conveyor::Conveyor;
 use crate::daemon::Daemon;
 use crate::holding;
+use crate::hooks;
 use crate::places::{self, Place};
 use crate::publish::Publisher;
 use crate::settings::{Inputs, Settings};
@@ -20,20 +21,20 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
     let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
     std::fs::read_dir(inbox).map_err(|e| format!("cannot watch {}: {e}; make the folder first", shown(inbox)))?;
     places::refuse_nested(&places(inbox, out, settings))?;
-    if settings.inputs != Inputs::Keep {
+    if settings.inputs != Inputs::Keep || settings.refused != Inputs::Keep {
         holding::try_out(inbox)?;
     }
     let publisher = Arc::new(Publisher::open(out)?);
     let mut lock = Lock::take(out)?;
     holding::recover(inbox, settings.recursive);
-    if let Inputs::Move(folder) = &settings.inputs {
-        holding::clear(folder, settings.recursive);
-    }
+    destinations(settings).for_each(|(_, folder)| holding::clear(folder, settings.recursive));
     let stop = signals::listen()?;
     let conveyor = Conveyor::start(settings, publisher.clone(), true).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
     let ended = Daemon::new(inbox, settings, &conveyor, (&mut lock, &publisher)).run(&stop)?;
-    // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more.
+    // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more, and no command
+    // runs on.
+    hooks::end_those_of(publisher.staging());
     publisher.close();
     tracing::info!(certified = ended.certified, refused = ended.refused, failed = ended.failed, "stopped");
     Ok(Exit::Success)
@@ -42,8 +43,15 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
 /// The folders that must not lie in each other.
 fn places<'a>(inbox: &'a Path, out: &'a Path, settings: &'a Settings) -> Vec<Place<'a>> {
     let mut all = vec![Place::new("inbox", inbox), Place::new("output folder", out)];
-    if let Inputs::Move(folder) = &settings.inputs {
-        all.push(Place::new("folder for inputs", folder));
-    }
+    all.extend(destinations(settings).map(|(role, folder)| Place::new(role, folder)));
     all
+}
+
+/// The folders to which inputs are moved, with what they are for.
+fn destinations(settings: &Settings) -> impl Iterator<Item = (&'static str, &Path)> {
+    let all = [("folder for inputs", &settings.inputs), ("folder for refused inputs", &settings.refused)];
+    all.into_iter().filter_map(|(role, inputs)| match inputs {
+        Inputs::Move(folder) => Some((role, folder.as_path())),
+        Inputs::Keep | Inputs::Delete => None,
+    })
 }

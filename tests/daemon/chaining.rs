@@ -8,7 +8,8 @@ use serde_json::Value;
 use std::fs;
 use std::io::Write;
 
-fn account(w: &Watched, name: &str) -> Option<Value> {
+/// What the commands on an input did, if that is told.
+pub fn account(w: &Watched, name: &str) -> Option<Value> {
     serde_json::from_slice(&fs::read(w.out.of(name).join("hooks.json")).ok()?).ok()
 }
 

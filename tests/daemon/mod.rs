@@ -1,12 +1,14 @@
 //! `planish watch`: the real program, fed, disturbed, stopped and killed.
 
 mod chaining;
+mod commanding;
 mod dropping;
 mod enduring;
 mod isolating;
 mod killing;
 mod many;
 mod putting_away;
+mod refusing;
 mod stopping;
 
 use crate::support::Out;

@@ -11,21 +11,21 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// The user that has no rights.
-const NOBODY: u32 = 65534;
+pub const NOBODY: u32 = 65534;
 
 fn set_mode(path: &Path, mode: u32) {
     fs::set_permissions(path, Permissions::from_mode(mode)).expect("set");
 }
 
 /// Whether the program can be run as another user.
-fn can_be_nobody() -> bool {
+pub fn can_be_nobody() -> bool {
     let mut command = Command::new(env!("CARGO_BIN_EXE_planish"));
     command.arg("--version").stdout(Stdio::null()).uid(NOBODY).gid(NOBODY);
     geteuid().is_root() && command.status().is_ok_and(|status| status.success())
 }
 
 /// Lets another user reach the inbox, and write results.
-fn open_for_nobody(w: &Watched) {
+pub fn open_for_nobody(w: &Watched) {
     set_mode(&w.beside(""), 0o755);
     chown(w.out.path(), Some(NOBODY), Some(NOBODY)).expect("given away");
 }

@@ -2,9 +2,9 @@
 
 use super::{run, script, tools};
 use crate::support::{Out, fixture, planish, root};
-use planish::hooks::{self, Hook, Outcome, Target};
+use planish::hooks::{self, Account, Chain, Hook, Occasion, Outcome, Target};
 use planish::report::mesh::MeshReport;
-use planish::settings::{OnCertified, Said};
+use planish::settings::{CommandSaid, Said};
 use std::path::Path;
 
 /// The settings file of the README's section "Drop a file, get a mesh".
@@ -17,10 +17,18 @@ pub fn settings_file() -> String {
 
 /// The hook with the programs of the environment on its PATH.
 fn with_tools(hook: &Hook) -> Hook {
-    let OnCertified { command, time_limit } = hook.configured().clone();
+    let CommandSaid { command, time_limit } = hook.configured().clone();
     let path = format!("PATH={}", tools().to_str().expect("UTF-8"));
     let command = ["env".to_owned(), path].into_iter().chain(command).collect();
-    Hook::new(OnCertified { command, time_limit }).expect("valid")
+    Hook::new(CommandSaid { command, time_limit }, Occasion::Certified).expect("valid")
+}
+
+/// Runs all commands to their end.
+fn ran(hooks: &[Hook], target: &Target, out: &Out) -> Account {
+    match hooks::run(hooks, target, out.path(), &|| true).expect("the system helps") {
+        Chain::Over(account) => account,
+        other => panic!("an account is expected: {other:?}"),
+    }
 }
 
 /// A certified result, and its target.
@@ -48,7 +56,7 @@ fn the_recipe_makes_a_mesh_and_nothing_else() {
     let before = files(target.folder());
     let said: Said = toml::from_str(&settings_file()).expect("valid");
     let recipe: Vec<Hook> = said.check().expect("in range").on_certified.iter().map(with_tools).collect();
-    let account = hooks::run(&recipe, &target, out.path(), &|| true).expect("the system helps").expect("an account");
+    let account = ran(&recipe, &target, &out);
     assert_eq!(account.failure(), None);
     let mut after: Vec<String> = files(target.folder());
     after.retain(|f| !before.contains(f));
@@ -73,11 +81,11 @@ fn a_mesh_that_is_not_faithful_is_told() {
     // In the place of the mesher, one that makes a single triangle.
     let lose = "printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' > \"$1\"/remeshed.obj";
     let command = ["sh", "-c", lose, "sh", "{folder}"].map(str::to_owned).into();
-    recipe[0] = Hook::new(OnCertified { command, time_limit: 60.0 }).expect("valid");
-    let OnCertified { command, time_limit } = recipe[1].configured().clone();
+    recipe[0] = Hook::new(CommandSaid { command, time_limit: 60.0 }, Occasion::Certified).expect("valid");
+    let CommandSaid { command, time_limit } = recipe[1].configured().clone();
     let command = command.iter().map(|part| part.replace("remeshed.msh", "remeshed.obj")).collect();
-    recipe[1] = Hook::new(OnCertified { command, time_limit }).expect("valid");
-    let account = hooks::run(&recipe, &target, out.path(), &|| true).expect("the system helps").expect("an account");
+    recipe[1] = Hook::new(CommandSaid { command, time_limit }, Occasion::Certified).expect("valid");
+    let account = ran(&recipe, &target, &out);
     assert!(account.failure().is_some(), "{account:?}");
     let outcomes: Vec<Outcome> = account.commands.iter().map(|c| c.outcome).collect();
     assert_eq!(outcomes, [Outcome::Succeeded, Outcome::Failed]);
@@ -92,10 +100,11 @@ fn accounts_follow_the_published_schema_and_leave_the_proof_alone() {
     let target = result(&out);
     let sh = |script: &str, time_limit| {
         let command = ["sh", "-c", script].map(str::to_owned).into();
-        Hook::new(OnCertified { command, time_limit }).expect("valid")
+        Hook::new(CommandSaid { command, time_limit }, Occasion::Certified).expect("valid")
     };
     let missing =
-        Hook::new(OnCertified { command: vec!["no-such-program".to_owned()], time_limit: 60.0 }).expect("valid");
+        Hook::new(CommandSaid { command: vec!["no-such-program".to_owned()], time_limit: 60.0 }, Occasion::Certified)
+            .expect("valid");
     let cases = [
         (vec![sh("echo made > made; yes | head -c 100000", 60.0)], Outcome::Succeeded),
         (vec![sh("exit 3", 60.0), sh("true", 60.0)], Outcome::Failed),
@@ -105,8 +114,7 @@ fn accounts_follow_the_published_schema_and_leave_the_proof_alone() {
     ];
     for (commands, outcome) in cases {
         assert!(hooks::are_due(&commands, &target));
-        let account =
-            hooks::run(&commands, &target, out.path(), &|| true).expect("the system helps").expect("an account");
+        let account = ran(&commands, &target, &out);
         assert_eq!(account.commands[0].outcome, outcome);
         let schema = root().join("docs/hooks.schema.json");
         let written = target.folder().join(hooks::FILE);
