@@ -2,6 +2,7 @@
 
 use crate::hooks::{self, Chain, Hook, HookError, Target};
 use crate::job::Job;
+use crate::ledger;
 use crate::outcome::{Code, Status};
 use crate::publish::Publisher;
 use crate::put_away::{Fate, Processed, PutAwayError, Way, put_away};
@@ -117,7 +118,7 @@ fn done_with(job: &Job, report: &Report, inputs: &Inputs, result: &Target) -> Re
     let hash = report.input.blake3.as_ref().and_then(|hash| Hash::from_hex(hash).ok());
     let Some(hash) = hash else { return Ok(Followed::Whole) };
     let quiet = since + QUIET;
-    if report.status == Status::Failed {
+    if !ledger::is_final(report) {
         // Taken up later, it would not be up to date, but computed again, and its commands would run again.
         if !wait_until(quiet, job) {
             return Ok(Followed::BrokenOff);

@@ -25,7 +25,8 @@ pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Folder) -> Option<Repo
     (same && complete && older.outputs.iter().all(there)).then_some(older)
 }
 
-fn is_final(report: &Report) -> bool {
+/// Whether doing the same input again would be in vain, as far as is known.
+pub fn is_final(report: &Report) -> bool {
     match report.reason.as_ref().map(|reason| reason.code) {
         Some(Code::Crashed) => true,
         Some(Code::TooLarge | Code::JobMemory | Code::JobTime) => false,
