@@ -8,6 +8,7 @@ mod doubts;
 mod every_mesh;
 mod fixtures;
 mod foreign;
+mod full;
 mod fuzz;
 mod interop;
 mod invariants;

@@ -49,16 +49,14 @@ pub(super) fn read(travel: Arc<Travel>, next: &Next) {
 
 /// Sees whether an input still has the content that was processed.
 fn doubt(travel: &Travel, hash: Hash) {
-    let is_same = |(now, _): (Hash, u64)| now == hash;
-    travel.end(match travel.compute(Stage::Read, |_| Ok(stages::hash_input(&travel.job, &travel.settings))) {
-        Ok(Ok(now)) if is_same(now) => End::Same,
-        Ok(Err(refusal)) if refusal.passes => End::Again(refusal.reason),
-        Ok(_) => {
-            let _in_stage = travel.in_stage(Stage::Read);
+    let _in_stage = travel.in_stage(Stage::Read);
+    travel.end(match stages::hash_input(&travel.job, &travel.settings) {
+        Ok((now, _)) if now == hash => End::Same,
+        Err(refusal) if refusal.passes => End::Again(refusal.reason),
+        _ => {
             tracing::info!("has changed since it was processed, although neither size nor times show it");
             End::Changed
         }
-        Err(_) => End::Unwanted,
     });
 }
 
@@ -133,20 +131,20 @@ fn leave(travel: Arc<Travel>, older: Report, next: &Next) {
 
 /// An input of which nothing is kept here: neither its bytes nor what becomes of them.
 fn read_apart(travel: Arc<Travel>, next: &Next) {
-    let hashed = travel.compute(Stage::Read, |_| Ok(stages::hash_input(&travel.job, &travel.settings)));
+    // Who waits for a disk holds no place to compute.
+    let hashed = stages::hash_input(&travel.job, &travel.settings);
     if !travel.job.is_unchanged() {
         return travel.end(End::Changed);
     }
     let mut report = Report::new(input(&travel.job, None), &travel.settings);
     let hash = match hashed {
-        Ok(Ok((hash, bytes))) => {
+        Ok((hash, bytes)) => {
             report.input.bytes = Some(bytes);
             report.input.blake3 = Some(hash.to_hex().to_string());
             hash
         }
-        Ok(Err(refusal)) if refusal.passes => return again(&travel, refusal.reason),
-        Ok(Err(refusal)) => return stop(travel, report, refusal.reason.into(), next),
-        Err(why) => return stop(travel, report, why, next),
+        Err(refusal) if refusal.passes => return again(&travel, refusal.reason),
+        Err(refusal) => return stop(travel, report, refusal.reason.into(), next),
     };
     if let Some(older) = up_to_date(&travel, &report, &Folder::of_job(&travel.job)) {
         return leave(travel, older, next);

@@ -14,7 +14,7 @@ fn small(i: usize) -> String {
 }
 
 /// Resident memory in KiB.
-fn memory(pid: u32) -> f64 {
+pub fn memory(pid: u32) -> f64 {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).expect("it runs");
     let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:")).expect("a size");
     line.trim().trim_end_matches(" kB").parse().expect("a number")

@@ -5,9 +5,10 @@ mod commanding;
 mod dropping;
 mod enduring;
 mod isolating;
-mod killing;
-mod many;
+pub mod killing;
+pub mod many;
 mod putting_away;
+mod reaching_out;
 mod refusing;
 mod stopping;
 
@@ -51,6 +52,11 @@ impl Watched {
         fs::write(&config, toml).expect("written");
         watched.args.extend(["--config".to_owned(), config.display().to_string()]);
         watched
+    }
+
+    /// One more argument for every start.
+    pub fn add_argument(&mut self, argument: &str) {
+        self.args.push(argument.to_owned());
     }
 
     pub fn inbox(&self) -> PathBuf {
@@ -128,6 +134,13 @@ impl Watched {
             }
             std::thread::sleep(Duration::from_millis(5));
         }
+    }
+
+    /// Asks the daemon to stop that runs below another program, which ends with it.
+    pub fn end_traced(&mut self) {
+        let traced = self.status()["pid"].as_u64().and_then(|pid| i32::try_from(pid).ok()).and_then(Pid::from_raw);
+        kill_process(traced.expect("it tells its number"), Signal::TERM).expect("sent");
+        assert_eq!(self.wait().code(), Some(0), "{}", self.log());
     }
 
     /// Kills the daemon as the system does when memory is short.
