@@ -1,12 +1,16 @@
 //! What follows when a result is certified: the commands run on it, and its input is put away.
 
+use crate::disk::System;
 use crate::hooks::{self, HookError, Target};
 use crate::job::Job;
-use crate::publish::Publisher;
+use crate::publish::{PublishError, Publisher};
 use crate::put_away::{Fate, Processed, PutAwayError, Way, put_away};
 use crate::report::Report;
 use crate::settings::{Inputs, Settings};
 use blake3::Hash;
+use parking_lot::Mutex;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Why what should follow did not.
@@ -15,6 +19,9 @@ pub enum ChainError {
     /// The commands could not be run.
     #[error(transparent)]
     Hook(#[from] HookError),
+    /// The result could not be brought to disk, or there is no place for what commands print.
+    #[error(transparent)]
+    Publish(#[from] PublishError),
     /// The input could not be put away.
     #[error(transparent)]
     PutAway(#[from] PutAwayError),
@@ -23,6 +30,9 @@ pub enum ChainError {
 /// How long a file must have been as it is before it is put away. A writer that pauses for longer loses what it writes
 /// later; one that pauses for less is waited for.
 const QUIET: Duration = Duration::from_secs(10);
+
+/// Inputs that somebody had open for writing when they were to be put away, as was told.
+static BUSY: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// What became of what follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +63,7 @@ pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publishe
     let hooks = &settings.on_certified;
     if hooks::are_due(hooks, &target) {
         tracing::info!(commands = hooks.len(), "runs commands");
-        let Some(account) = hooks::run(hooks, &target, publisher.staging(), &|| job.is_wanted())? else {
+        let Some(account) = hooks::run(hooks, &target, &publisher.staging()?, &|| job.is_wanted())? else {
             return Ok(Followed::BrokenOff);
         };
         if account.failure().is_none() {
@@ -64,13 +74,13 @@ pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publishe
     // With files beside it, an input would lose its sense elsewhere; and they may belong to others, too.
     let is_alone = report.input.beside.is_empty();
     if all_succeeded && is_alone && report.refused_components.is_empty() {
-        return Ok(done_with(job, report, settings)?);
+        return done_with(job, report, settings, publisher);
     }
     Ok(Followed::Whole)
 }
 
 /// Puts the input away, as the settings say; inputs of an inbox only.
-fn done_with(job: &Job, report: &Report, settings: &Settings) -> Result<Followed, PutAwayError> {
+fn done_with(job: &Job, report: &Report, settings: &Settings, publisher: &Publisher) -> Result<Followed, ChainError> {
     let (Some(look), Some(since), Some(inbox)) = (&job.look, job.since, &job.within) else {
         return Ok(Followed::Whole);
     };
@@ -89,8 +99,23 @@ fn done_with(job: &Job, report: &Report, settings: &Settings) -> Result<Followed
     if since.elapsed() < QUIET {
         return Ok(Followed::Until(since + QUIET));
     }
-    Ok(match put_away(&Processed { inbox, name: &job.name, look, hash }, way)? {
-        Fate::Away | Fate::Nothing => Followed::Whole,
-        Fate::Changed => Followed::Changed,
+    // The input is all that the result could be made from again.
+    publisher.secure(&job.name)?;
+    Ok(match put_away(&System, &Processed { inbox, name: &job.name, look, hash }, way)? {
+        Fate::Busy => {
+            tell_once(&job.path);
+            Followed::Until(Instant::now() + QUIET)
+        }
+        ended => {
+            BUSY.lock().remove(&job.path);
+            if ended == Fate::Changed { Followed::Changed } else { Followed::Whole }
+        }
     })
+}
+
+/// Tells that an input waits for somebody who writes to it, the first time.
+fn tell_once(path: &Path) {
+    if BUSY.lock().insert(path.to_owned()) {
+        tracing::info!("somebody has it open for writing: it is put away when it is closed");
+    }
 }

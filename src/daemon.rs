@@ -3,6 +3,7 @@
 use crate::conveyor::{Conveyor, Ended};
 use crate::inbox::{Change, Inbox};
 use crate::job::{End, Job};
+use crate::publish::Publisher;
 use crate::settings::Settings;
 use crate::shown::shown;
 use crate::status::{Counts, Lock, NAMED, Progress, Status};
@@ -41,7 +42,7 @@ pub struct Daemon<'a> {
     settings: &'a Settings,
     conveyor: &'a Conveyor,
     lock: &'a Lock,
-    staging: &'a Path,
+    publisher: &'a Publisher,
     eyes: Eyes,
     inbox: Inbox,
     jobs: BTreeMap<PathBuf, Arc<Job>>,
@@ -59,7 +60,7 @@ impl<'a> Daemon<'a> {
         inbox: &Path,
         settings: &'a Settings,
         conveyor: &'a Conveyor,
-        (lock, staging): (&'a Lock, &'a Path),
+        (lock, publisher): (&'a Lock, &'a Publisher),
     ) -> Self {
         let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs());
         let status =
@@ -69,7 +70,7 @@ impl<'a> Daemon<'a> {
             settings,
             conveyor,
             lock,
-            staging,
+            publisher,
             eyes: Eyes::new(inbox, settings.recursive, settings.poll),
             inbox: Inbox::default(),
             jobs: BTreeMap::new(),
@@ -223,7 +224,8 @@ impl<'a> Daemon<'a> {
         self.status.running = self.conveyor.running().into_iter().map(Progress::from).collect();
         self.status.unsettled = self.inbox.unsettled();
         self.status.log_lines_lost = crate::logging::lost();
-        if let Err(error) = self.lock.tell(&self.status, self.staging) {
+        let staging = self.publisher.staging().map_err(std::io::Error::other);
+        if let Err(error) = staging.and_then(|staging| self.lock.tell(&self.status, &staging)) {
             tracing::warn!("the status for `planish status` cannot be written: {error}");
         }
         self.next_tell = now + TELL;

@@ -3,6 +3,7 @@
 use super::{Exit, shown};
 use crate::conveyor::Conveyor;
 use crate::daemon::Daemon;
+use crate::disk::System;
 use crate::holding;
 use crate::places::{self, Place};
 use crate::publish::Publisher;
@@ -21,18 +22,18 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
     std::fs::read_dir(inbox).map_err(|e| format!("cannot watch {}: {e}; make the folder first", shown(inbox)))?;
     places::refuse_nested(&places(inbox, out, settings))?;
     if settings.inputs != Inputs::Keep {
-        holding::try_out(inbox)?;
+        holding::try_out(&System, inbox)?;
     }
     let publisher = Arc::new(Publisher::open(out)?);
     let lock = Lock::take(out)?;
-    holding::recover(inbox, settings.recursive);
+    holding::recover(&System, inbox, settings.recursive);
     if let Inputs::Move(folder) = &settings.inputs {
-        holding::clear(folder, settings.recursive);
+        holding::clear(&System, folder, settings.recursive);
     }
     let stop = signals::listen()?;
     let conveyor = Conveyor::start(settings, publisher.clone()).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
-    let ended = Daemon::new(inbox, settings, &conveyor, (&lock, publisher.staging())).run(&stop)?;
+    let ended = Daemon::new(inbox, settings, &conveyor, (&lock, &publisher)).run(&stop)?;
     // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more.
     publisher.close();
     tracing::info!(certified = ended.certified, refused = ended.refused, failed = ended.failed, "stopped");
