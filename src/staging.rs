@@ -14,6 +14,7 @@ use crate::disk::{self, Disk, File as _, Folder, OPEN_FILE, OPEN_FOLDER, Rename}
 use crate::own;
 use crate::publish::{Content, PublishError, STAGING, at};
 use crate::replace::{self, NotKept};
+use crate::report;
 use crate::shown::shown;
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
@@ -106,7 +107,7 @@ impl<F: Folder> Run<F> {
             settle_all(disk, out, &self.folder)?;
         }
         let root = disk.open(&out.join(STAGING)).map_err(at(&self.path))?;
-        disk::remove_all(&root, &self.name).map_err(at(&self.path))
+        clear(&root, &self.name, &self.folder).map_err(at(&self.path))
     }
 }
 
@@ -162,11 +163,20 @@ fn clear_one<D: Disk>(disk: &D, out: &Path, root: &D::Folder, name: &OsStr) -> R
         return Ok(());
     }
     settle_all(disk, out, &run)?;
-    // The lock goes last: what is not removed is found to be ours again.
-    for inside in run.list().map_err(at(&path))?.iter().filter(|inside| *inside != LOCK) {
-        disk::remove_all(&run, inside).map_err(at(&path))?;
+    clear(root, name, &run).map_err(at(&path))
+}
+
+/// Removes a staging folder in which everything is settled. The lock goes last: what is not removed is found to be ours
+/// again.
+fn clear<F: Folder>(root: &F, name: &OsStr, run: &F) -> io::Result<()> {
+    for name in run.list()?.into_iter().filter(|inside| inside != LOCK) {
+        if run.stat_of(&name)?.is_folder() {
+            Desk { folder: run.open_folder(&name)?, name }.clear(run)?;
+        } else {
+            disk::remove_all(run, &name)?;
+        }
     }
-    disk::remove_all(root, name).map_err(at(&path))
+    disk::remove_all(root, name)
 }
 
 /// Whether there is a desk with something that may be wanted.
@@ -424,13 +434,27 @@ impl<F: Folder> Desk<F> {
     /// Clears the desk, if nothing on it may be wanted.
     pub fn remove(&self, run: &Run<F>) {
         let removed = match self.promise() {
-            Ok(None) => disk::remove_all(&run.folder, &self.name),
+            Ok(None) => self.clear(&run.folder),
             Ok(Some(_)) => return,
             Err(error) => Err(error),
         };
         if let Err(error) = removed {
             tracing::debug!(%error, "what was staged is left to the end of the program");
         }
+    }
+
+    /// Removes the desk. A loss of power may bring it back, settled or not: so results lose their reports last, by which
+    /// it is known what in them is planish's.
+    fn clear(&self, run: &F) -> io::Result<()> {
+        for name in self.folder.list()? {
+            if self.folder.stat_of(&name)?.is_folder() {
+                let result = self.folder.open_folder(&name)?;
+                for name in result.list()?.iter().filter(|name| *name != report::FILE) {
+                    disk::remove_all(&result, name)?;
+                }
+            }
+        }
+        disk::remove_all(run, &self.name)
     }
 }
 

@@ -631,18 +631,19 @@ fn a_disk_that_lies_is_found_out() {
 
 /// Takes minutes: `cargo test --release -- --ignored full`.
 #[test]
-#[ignore = "long"]
-fn full_all_scenes() {
+#[ignore = "takes minutes"]
+fn full_kills_failures_and_others_at_every_operation() {
+    let step: usize = std::env::var("PLANISH_SCENES_STEP").ok().and_then(|step| step.parse().ok()).unwrap_or(3);
     let mut tally = Tally::default();
     for stage in stages() {
         kill_everywhere(&stage, None, Effort { step: 1, seeds: 6 }, Lies::None, &mut tally);
-        fail_everywhere(&stage, Effort { step: 1, seeds: 1 }, &mut tally);
-        others_everywhere(&stage, Effort { step: 1, seeds: 1 }, &mut tally);
-        kill_twice(&stage, Effort { step: 7, seeds: 1 }, &mut tally);
+        fail_everywhere(&stage, Effort { step, seeds: 1 }, &mut tally);
+        others_everywhere(&stage, Effort { step, seeds: 1 }, &mut tally);
+        kill_twice(&stage, Effort { step: 3 * step, seeds: 1 }, &mut tally);
         for (i, other) in OTHERS.into_iter().enumerate() {
-            for operation in [20, 50, 80, 110, 140, 170] {
+            for operation in (20 + i..200).step_by(10 * step) {
                 let effort = Effort { step: 5, seeds: 1 };
-                kill_everywhere(&stage, Some((other, operation + 3 * i)), effort, Lies::None, &mut tally);
+                kill_everywhere(&stage, Some((other, operation)), effort, Lies::None, &mut tally);
             }
         }
     }

@@ -433,7 +433,7 @@ impl Simulated {
         world.walk(path.as_ref()).ok().map(|node| world.stat(node))
     }
 
-    /// What somebody else does is on disk at once.
+    /// What somebody else does is on disk at once, with all names on the way there.
     fn theirs<T>(&self, path: &str, act: impl FnOnce(&mut World, usize, &OsStr) -> T) -> T {
         let path = Path::new(path);
         let (above, name) = (path.parent().expect("not the top"), path.file_name().expect("a name"));
@@ -443,7 +443,10 @@ impl Simulated {
         let world = &mut self.machine.lock().world;
         let folder = world.walk(above).expect("made");
         let done = act(world, folder, name);
-        world.sync_names(folder);
+        for path in above.ancestors() {
+            let folder = world.walk(path).expect("on the way");
+            world.sync_names(folder);
+        }
         done
     }
 
