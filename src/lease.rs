@@ -13,8 +13,7 @@ use std::io;
 const F_SETSIG: i32 = 10;
 
 /// Whether somebody has `file`, which is open for reading only, open for writing, here or in another process. None: the
-/// system cannot tell, as for the files of other users, and on file systems that know no leases (most of those in a
-/// network).
+/// system cannot tell, as for the files of other users, and on file systems in a network.
 ///
 /// # Errors
 /// Those of the system that say nothing about leases.
@@ -28,6 +27,7 @@ pub fn has_writer(file: &File) -> io::Result<Option<bool>> {
         // Given back at once: who opens the file to write to it must not be kept waiting.
         Ok(()) => control(file, libc::F_SETLEASE, libc::F_UNLCK).map(|()| Some(false)),
         Err(error) => match Errno::from_io_error(&error) {
+            Some(Errno::AGAIN) if is_in_network(file)? => Ok(None),
             Some(Errno::AGAIN) => Ok(Some(true)),
             Some(Errno::ACCESS | Errno::PERM | Errno::INVAL | Errno::NOSYS | Errno::OPNOTSUPP | Errno::NOLCK) => {
                 Ok(None)
@@ -35,6 +35,27 @@ pub fn has_writer(file: &File) -> io::Result<Option<bool>> {
             _ => Err(error),
         },
     }
+}
+
+/// Whether a file is on a file system that refuses leases in the same way where nobody has the file open: its server did
+/// not lend the file to this machine.
+#[cfg(target_os = "linux")]
+fn is_in_network(file: &File) -> io::Result<bool> {
+    // NFS, SMB and CIFS, Ceph, AFS, Lustre, OCFS2, 9P and whatever is behind FUSE (linux/magic.h).
+    const NETWORKS: [i128; 10] = [
+        0x6969,
+        0x517b,
+        0xff53_4d42,
+        0xfe53_4d42,
+        0x00c3_6400,
+        0x5346_414f,
+        0x0bd0_0bd0,
+        0x7461_636f,
+        0x0102_1997,
+        0x6573_5546,
+    ];
+    let kind = i128::from(rustix::fs::fstatfs(file)?.f_type) & 0xffff_ffff;
+    Ok(NETWORKS.contains(&kind))
 }
 
 /// Whether somebody has `file` open for writing: this system cannot tell.

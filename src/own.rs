@@ -31,15 +31,26 @@ const PAUSE: Duration = Duration::from_millis(50);
 pub fn folder<D: Disk>(disk: &D, path: &Path) -> io::Result<D::Folder> {
     let above = disk::make_all(disk, path.parent().unwrap_or(path))?;
     let name = path.file_name().unwrap_or_default();
-    match above.make_folder(name, OPEN_FOLDER) {
-        Ok(()) => above.sync()?,
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-        Err(error) => return Err(error),
-    }
-    above.open_folder(name).map_err(|error| {
+    let opened = match above.open_folder(name) {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            made_or_there(above.make_folder(name, OPEN_FOLDER))?;
+            above.sync()?;
+            above.open_folder(name)
+        }
+        opened => opened,
+    };
+    opened.map_err(|error| {
         let told = "it is no folder, or a link to one; remove it, or use another output folder";
         if disk::is_no_folder(&error) { io::Error::other(told) } else { error }
     })
+}
+
+/// Somebody else may make the same folder in the same moment.
+fn made_or_there(made: io::Result<()>) -> io::Result<()> {
+    match made {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(()),
+        made => made,
+    }
 }
 
 /// As [`open_lock`], in the folder at a path.

@@ -130,7 +130,7 @@ impl<D: Disk> Publisher<D> {
     /// # Errors
     /// As [`Publisher::open`].
     pub fn open_on(disk: D, out: &Path) -> Result<Self, PublishError> {
-        let run = Mutex::new(Arc::new(Run::make(&disk, out)?));
+        let run = Mutex::new(Arc::new(Run::make(&disk, out, || true)?));
         // A program that was killed may have made it, and not brought its name to disk.
         disk::sync_name(&disk, out).map_err(at(out))?;
         Ok(Self { disk, out: out.to_owned(), run, open: Mutex::new(true) })
@@ -153,11 +153,12 @@ impl<D: Disk> Publisher<D> {
     fn run(&self) -> Result<Arc<Run<D::Folder>>, PublishError> {
         let mut run = self.run.lock();
         if !run.is_there(&self.disk).map_err(at(&run.path))? {
-            if !*self.open.lock() {
+            let is_open = || *self.open.lock();
+            if !is_open() {
                 return Err(PublishError::Closed);
             }
             tracing::warn!(folder = shown(&run.path), "the staging folder was removed: another one is made");
-            *run = Arc::new(Run::make(&self.disk, &self.out)?);
+            *run = Arc::new(Run::make(&self.disk, &self.out, is_open)?);
         }
         Ok(run.clone())
     }
@@ -258,8 +259,7 @@ impl<D: Disk> Publisher<D> {
 
     /// Nothing is put in place any more, and the staging folder goes. Whoever still writes to it hears of an error.
     pub fn close(&self) {
-        let mut open = self.open.lock();
-        *open = false;
+        *self.open.lock() = false;
         if let Err(error) = self.run.lock().remove(&self.disk, &self.out) {
             tracing::debug!(%error, "the staging folder is left to the next start");
         }

@@ -58,15 +58,16 @@ fn root<D: Disk>(disk: &D, out: &Path) -> Result<D::Folder, PublishError> {
 }
 
 impl<F: Folder> Run<F> {
-    /// Makes one, in an output folder that is made where it is missing, and clears what dead processes left behind.
+    /// Makes one, in an output folder that is made where it is missing, and clears what dead processes left behind. Others
+    /// are waited for as long as it is `wanted`.
     ///
     /// # Errors
     /// [`PublishError`] where the folder cannot be written.
-    pub fn make<D: Disk<Folder = F>>(disk: &D, out: &Path) -> Result<Self, PublishError> {
+    pub fn make<D: Disk<Folder = F>>(disk: &D, out: &Path, wanted: impl Fn() -> bool) -> Result<Self, PublishError> {
         let path = out.join(STAGING);
         root(disk, out)?;
         // One process at a time, so that a folder is never seen between being made and being locked.
-        let _opening = pass_gate(disk, out, || true)?.ok_or_else(|| PublishError::Busy(path.join(GATE)))?;
+        let _opening = pass_gate(disk, out, wanted)?.ok_or_else(|| PublishError::Busy(path.join(GATE)))?;
         let root = root(disk, out)?;
         clear_stale(disk, out, &root);
         let (name, folder) = disk::make_unique_folder(&root, RUN, OPEN_FOLDER).map_err(at(&path))?;
@@ -97,13 +98,10 @@ impl<F: Folder> Run<F> {
     /// # Errors
     /// [`PublishError`].
     pub fn remove<D: Disk<Folder = F>>(&self, disk: &D, out: &Path) -> Result<(), PublishError> {
-        let gate = if has_unsettled(&self.folder).map_err(at(&self.path))? {
+        if !promised(&self.folder).map_err(at(&self.path))?.is_empty() {
             // Nobody who closes is kept waiting by a lock.
-            Some(pass_gate(disk, out, || false)?.ok_or_else(|| PublishError::Busy(out.join(STAGING).join(GATE)))?)
-        } else {
-            None
-        };
-        if gate.is_some() {
+            let gate = pass_gate(disk, out, || false)?;
+            let _alone = gate.ok_or_else(|| PublishError::Busy(out.join(STAGING).join(GATE)))?;
             settle_all(disk, out, &self.folder)?;
         }
         let root = disk.open(&out.join(STAGING)).map_err(at(&self.path))?;
@@ -177,11 +175,6 @@ fn clear<F: Folder>(root: &F, name: &OsStr, run: &F) -> io::Result<()> {
         }
     }
     disk::remove_all(root, name)
-}
-
-/// Whether there is a desk with something that may be wanted.
-fn has_unsettled<F: Folder>(run: &F) -> io::Result<bool> {
-    Ok(!promised(run)?.is_empty())
 }
 
 /// The desks on which something may be wanted, and what that is.
@@ -309,7 +302,7 @@ impl<F: Folder> Desk<F> {
     }
 
     /// Where the file system cannot exchange two folders, the older one is moved away first.
-    pub(crate) fn put_in_place_in_two_steps(&self, folder: &F, name: &OsStr) -> io::Result<()> {
+    fn put_in_place_in_two_steps(&self, folder: &F, name: &OsStr) -> io::Result<()> {
         match folder.rename(name, &self.folder, OLDER, Rename::Over) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
             Ok(()) | Err(_) => {}

@@ -549,6 +549,25 @@ fn fail_everywhere(stage: &Stage, effort: Effort, tally: &mut Tally) {
     }
 }
 
+/// Every operation fails once, and the process is killed some time later.
+fn fail_and_kill(stage: &Stage, effort: Effort, tally: &mut Tally) {
+    let (.., (operations, changes)) = run(stage, Plan::default(), None, Lies::None);
+    for operation in (0..operations).step_by(effort.step) {
+        // It has more to do than one that nothing happens to.
+        for kill in (0..2 * changes).step_by(effort.step) {
+            let plan = Plan { kill: Some(kill), fail: Some((operation, Errno::IO)) };
+            let (disk, expected, (_, made)) = run(stage, plan, None, Lies::None);
+            for left in [None, Some(Left::Nothing)] {
+                let what = || format!("{stage:?}, operation {operation} fails, killed before change {kill}, {left:?}");
+                tally.add(what, do_again(&disk, left, stage, &expected));
+            }
+            if made < kill {
+                break;
+            }
+        }
+    }
+}
+
 /// Somebody does something before every operation.
 fn others_everywhere(stage: &Stage, effort: Effort, tally: &mut Tally) {
     let (.., (operations, _)) = run(stage, Plan::default(), None, Lies::None);
@@ -606,6 +625,7 @@ fn any_operation_may_fail_once() {
     for stage in stages() {
         fail_everywhere(&stage, Effort { step: 73, seeds: 0 }, &mut tally);
     }
+    fail_and_kill(&Stage::plain(Inputs::Delete), Effort { step: 5, seeds: 0 }, &mut tally);
     tally.assert_right("some operations fail");
 }
 
@@ -640,6 +660,7 @@ fn full_kills_failures_and_others_at_every_operation() {
         fail_everywhere(&stage, Effort { step, seeds: 1 }, &mut tally);
         others_everywhere(&stage, Effort { step, seeds: 1 }, &mut tally);
         kill_twice(&stage, Effort { step: 3 * step, seeds: 1 }, &mut tally);
+        fail_and_kill(&stage, Effort { step: 2 * step, seeds: 0 }, &mut tally);
         for (i, other) in OTHERS.into_iter().enumerate() {
             for operation in (20 + i..200).step_by(10 * step) {
                 let effort = Effort { step: 5, seeds: 1 };
