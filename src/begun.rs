@@ -12,6 +12,7 @@
 //!
 //! Nothing here is brought to disk: marks are for deaths of processes, which the memory of the system survives.
 
+use crate::disk::{Disk, System};
 use crate::look::Look;
 use crate::own;
 use crate::publish::STAGING;
@@ -75,7 +76,6 @@ fn boot() -> String {
 /// The marks of a process, and the deaths of those before it.
 #[derive(Debug)]
 pub struct Begun {
-    staging: PathBuf,
     deaths: PathBuf,
 }
 
@@ -89,13 +89,13 @@ pub struct Suspect {
 }
 
 impl Begun {
-    /// The marks in the staging folder of this process, which writes to the output folder `out`.
-    pub fn new(out: &Path, staging: &Path) -> Self {
-        Self { staging: staging.to_owned(), deaths: out.join(STAGING).join(DEATHS) }
+    /// Those of a process that writes to the output folder `out`.
+    pub fn new(out: &Path) -> Self {
+        Self { deaths: out.join(STAGING).join(DEATHS) }
     }
 
-    /// What is known of an input.
-    pub fn about(&self, name: &Path, look: Option<Look>) -> Suspect {
+    /// What is known of an input; its mark will be in the folder `staging` of this process.
+    pub fn about(&self, name: &Path, look: Option<Look>, staging: &Path) -> Suspect {
         let mut entry = Entry::of(name, look);
         let record = self.deaths.join(file(name));
         match read(&record) {
@@ -104,7 +104,7 @@ impl Begun {
             Some(_) => drop(forget(&record)),
             None => {}
         }
-        let mark = self.staging.join(format!("{MARK}{}", file(name)));
+        let mark = staging.join(format!("{MARK}{}", file(name)));
         Suspect { mark, is_marked: false, record, entry }
     }
 }
@@ -179,7 +179,8 @@ pub fn forgive(out: &Path, name: &Path) -> bool {
 }
 
 /// Counts the deaths of which the marks in the staging folder of a dead process tell.
-pub fn take_over(staging: &Path, dead: &Path) {
+pub fn take_over(dead: &Path) {
+    let Some(staging) = dead.parent() else { return };
     let Ok(entries) = fs::read_dir(dead) else { return };
     let is_mark = |e: &fs::DirEntry| e.file_name().as_bytes().starts_with(MARK.as_bytes());
     for path in entries.flatten().filter(is_mark).map(|e| e.path()) {
@@ -193,7 +194,8 @@ pub fn take_over(staging: &Path, dead: &Path) {
 
 fn take_over_one(staging: &Path, path: &Path) -> io::Result<()> {
     let Some(name) = path.file_name().and_then(|n| n.to_str()) else { return Ok(()) };
-    let lock = own::lock_file_there(path.parent().unwrap_or(path), name)?;
+    let folder = System.open(path.parent().unwrap_or(path))?;
+    let lock = own::open_lock_there(&folder, name.as_ref())?;
     own::lock(&lock, path, ORPHAN, || true)?;
     let (Some(mut entry), Some(file)) = (read(path), name.strip_prefix(MARK)) else { return Ok(()) };
     if entry.boot != boot() {
@@ -221,7 +223,7 @@ fn read(path: &Path) -> Option<Entry> {
 /// Puts a record in its place at once.
 fn write(record: &Path, entry: &Entry) -> io::Result<()> {
     let folder = record.parent().unwrap_or(record);
-    own::folder(folder)?;
+    own::folder(&System, folder)?;
     let fresh = tempfile::NamedTempFile::new_in(folder)?;
     fs::write(fresh.path(), serde_json::to_vec(entry)?)?;
     fresh.persist(record).map_err(|e| e.error)?;
@@ -257,23 +259,23 @@ mod tests {
             self.out.path().join(STAGING)
         }
 
-        /// A process that has taken up inputs, and perhaps died.
-        fn process(&self, run: &str) -> Begun {
+        /// What a process knows of an input, which will perhaps die of it.
+        fn about(&self, run: &str, name: &str, look: Option<Look>) -> Suspect {
             let folder = self.staging().join(run);
             fs::create_dir_all(&folder).expect("made");
-            Begun::new(self.out.path(), &folder)
+            Begun::new(self.out.path()).about(name.as_ref(), look, &folder)
         }
 
         /// A process dies while it has an input on its way.
         fn die(&self, run: &str, name: &str) {
-            let mut suspect = self.process(run).about(name.as_ref(), None);
+            let mut suspect = self.about(run, name, None);
             suspect.begin().expect("marked");
             std::mem::forget(suspect);
-            take_over(&self.staging(), &self.staging().join(run));
+            take_over(&self.staging().join(run));
         }
 
         fn deaths(&self, name: &str) -> u32 {
-            self.process("run-9").about(name.as_ref(), None).deaths()
+            self.about("run-9", name, None).deaths()
         }
     }
 
@@ -284,7 +286,7 @@ mod tests {
         assert_eq!((place.deaths("a.stl"), place.deaths("b.stl")), (1, 0));
         place.die("run-2", "a.stl");
         assert_eq!(place.deaths("a.stl"), MOST_DEATHS);
-        place.process("run-9").about("a.stl".as_ref(), None).acquit();
+        place.about("run-9", "a.stl", None).acquit();
         assert_eq!(place.deaths("a.stl"), 0);
         assert!(!place.staging().join(DEATHS).exists(), "nothing is left");
     }
@@ -292,9 +294,8 @@ mod tests {
     #[test]
     fn an_input_that_has_ended_leaves_no_mark() {
         let place = Place::new();
-        let begun = place.process("run-1");
-        begun.about("a.stl".as_ref(), None).begin().expect("marked");
-        assert_eq!(fs::read_dir(&begun.staging).expect("a folder").count(), 0);
+        place.about("run-1", "a.stl", None).begin().expect("marked");
+        assert_eq!(fs::read_dir(place.staging().join("run-1")).expect("a folder").count(), 0);
     }
 
     #[test]
@@ -304,7 +305,7 @@ mod tests {
         let file = place.out.path().join("a.stl");
         fs::write(&file, "newer").expect("written");
         let look = Look::at(&file).expect("there");
-        assert_eq!(place.process("run-2").about("a.stl".as_ref(), look).deaths(), 0);
+        assert_eq!(place.about("run-2", "a.stl", look).deaths(), 0);
         assert!(!place.staging().join(DEATHS).exists(), "nor does anything tell of the older one");
     }
 
@@ -313,7 +314,7 @@ mod tests {
     fn orphans_accuse_nobody_and_children_that_died_with_their_parents_do() {
         for outlives in [true, false] {
             let place = Place::new();
-            let suspect = place.process("run-1").about("a.stl".as_ref(), None);
+            let suspect = place.about("run-1", "a.stl", None);
             let (mark, entry) = suspect.mark();
             let child = begin_apart(mark, entry).expect("marked");
             let mark = mark.to_owned();
@@ -324,7 +325,7 @@ mod tests {
                 }
                 drop(child);
             });
-            take_over(&place.staging(), &place.staging().join("run-1"));
+            take_over(&place.staging().join("run-1"));
             orphan.join().expect("ends");
             assert_eq!(place.deaths("a.stl"), u32::from(!outlives));
         }
@@ -333,10 +334,10 @@ mod tests {
     #[test]
     fn a_machine_that_was_switched_off_accuses_nobody() {
         let place = Place::new();
-        let mut suspect = place.process("run-1").about("a.stl".as_ref(), None);
+        let mut suspect = place.about("run-1", "a.stl", None);
         suspect.entry.boot = "another".to_owned();
         suspect.begin().expect("marked");
-        take_over(&place.staging(), &place.staging().join("run-1"));
+        take_over(&place.staging().join("run-1"));
         assert_eq!(place.deaths("a.stl"), 0);
     }
 

@@ -1,14 +1,18 @@
 //! What follows when a result stands: the commands run on it, and its input is put away.
 
+use crate::disk::System;
 use crate::hooks::{self, Chain, Hook, HookError, Target};
 use crate::job::Job;
 use crate::ledger;
 use crate::outcome::{Code, Status};
-use crate::publish::Publisher;
+use crate::publish::{PublishError, Publisher};
 use crate::put_away::{Fate, Processed, PutAwayError, Way, put_away};
 use crate::report::Report;
 use crate::settings::{Inputs, Settings};
 use blake3::Hash;
+use parking_lot::Mutex;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Why what should follow did not.
@@ -17,6 +21,9 @@ pub enum ChainError {
     /// The commands could not be run.
     #[error(transparent)]
     Hook(#[from] HookError),
+    /// The result could not be brought to disk, or there is no place for what commands print.
+    #[error(transparent)]
+    Publish(#[from] PublishError),
     /// The input could not be put away.
     #[error(transparent)]
     PutAway(#[from] PutAwayError),
@@ -28,6 +35,9 @@ const QUIET: Duration = Duration::from_secs(10);
 
 /// How often it is asked whether a job is still wanted, while it waits for its input to be quiet.
 const POLL: Duration = Duration::from_millis(50);
+
+/// Inputs that somebody had open for writing when they were to be put away, as was told.
+static BUSY: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// What became of what follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +79,7 @@ pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publishe
     let target = target(job, report, publisher)?;
     if hooks::are_due(hooks, &target) {
         tracing::info!(commands = hooks.len(), "runs commands");
-        match hooks::run(hooks, &target, publisher.staging(), &|| job.is_wanted())? {
+        match hooks::run(hooks, &target, &publisher.staging()?, &|| job.is_wanted())? {
             Chain::BrokenOff => return Ok(Followed::BrokenOff),
             Chain::Taken(command) => return Ok(Followed::Taken(command)),
             Chain::Over(account) if account.failure().is_none() => tracing::info!("commands have succeeded"),
@@ -80,7 +90,7 @@ pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publishe
     if !all_succeeded || !may_go(job, report) {
         return Ok(Followed::Whole);
     }
-    done_with(job, report, inputs, &target)
+    done_with(job, report, (inputs, &target), publisher)
 }
 
 fn target(job: &Job, report: &Report, publisher: &Publisher) -> Result<Target, HookError> {
@@ -101,7 +111,12 @@ fn may_go(job: &Job, report: &Report) -> bool {
 }
 
 /// Puts the input away, as the settings say; inputs of an inbox only.
-fn done_with(job: &Job, report: &Report, inputs: &Inputs, result: &Target) -> Result<Followed, ChainError> {
+fn done_with(
+    job: &Job,
+    report: &Report,
+    (inputs, result): (&Inputs, &Target),
+    publisher: &Publisher,
+) -> Result<Followed, ChainError> {
     let (Some(look), Some(since), Some(inbox)) = (&job.look, job.since, &job.within) else {
         return Ok(Followed::Whole);
     };
@@ -130,10 +145,25 @@ fn done_with(job: &Job, report: &Report, inputs: &Inputs, result: &Target) -> Re
     if !result.is_there() {
         return Err(HookError::NoReport(result.folder().to_owned()).into());
     }
-    Ok(match put_away(&Processed { inbox, name: &job.name, look, hash }, way)? {
-        Fate::Away | Fate::Nothing => Followed::Whole,
-        Fate::Changed => Followed::Changed,
+    // The input is all that the result could be made from again.
+    publisher.secure(&job.name)?;
+    Ok(match put_away(&System, &Processed { inbox, name: &job.name, look, hash }, way)? {
+        Fate::Busy => {
+            tell_once(&job.path);
+            Followed::Until(Instant::now() + QUIET)
+        }
+        ended => {
+            BUSY.lock().remove(&job.path);
+            if ended == Fate::Changed { Followed::Changed } else { Followed::Whole }
+        }
     })
+}
+
+/// Tells that an input waits for somebody who writes to it, the first time.
+fn tell_once(path: &Path) {
+    if BUSY.lock().insert(path.to_owned()) {
+        tracing::info!("somebody has it open for writing: it is put away when it is closed");
+    }
 }
 
 /// Waits until `then`, as long as the job is wanted; whether it is.

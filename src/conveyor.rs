@@ -80,7 +80,7 @@ impl Conveyor {
     /// # Errors
     /// Where the system has no more threads.
     pub fn start(settings: &Settings, publisher: Arc<Publisher>, is_patient: bool) -> std::io::Result<Self> {
-        let begun = Begun::new(publisher.out(), publisher.staging());
+        let begun = Begun::new(publisher.out());
         let grants = Arc::new(Own::new(settings.jobs, settings.memory));
         let mut conveyor = Self::idle(settings, Sink::Out(publisher), grants, Some(begun), is_patient);
         let (chain, chained) = bounded(CHAINED);

@@ -332,7 +332,8 @@ impl<'a> Daemon<'a> {
         self.status.oldest = self.inbox.oldest().map(|since| status::tenths(since.elapsed()));
         self.status.told = status::now();
         self.status.log_lines_lost = crate::logging::lost();
-        let told = self.lock.tell(&self.status, self.publisher.staging());
+        let staging = self.publisher.staging().map_err(std::io::Error::other);
+        let told = staging.and_then(|staging| self.lock.tell(&self.status, &staging));
         if let Err(error) = &told
             && self.is_told
         {

@@ -8,26 +8,20 @@
 //! Deliberately absent: any copy. What is held goes in and comes back by a rename, so nothing of it is opened, be it a
 //! link, a pipe or a device.
 
-use crate::regular::{self, OpenError};
+use crate::disk::{self, Disk, File, Folder, Stat};
+use crate::regular::OpenError;
 use crate::shown::shown;
-use rustix::fd::{AsFd, BorrowedFd, OwnedFd};
-use rustix::fs::{AtFlags, Dir, FileType, Mode, linkat, mkdirat, renameat, statat, unlinkat};
-use rustix::io::Errno;
 use rustix::process::geteuid;
 use std::ffi::{OsStr, OsString};
-use std::fs::{File, Metadata};
-use std::hash::{BuildHasher, RandomState};
-use std::io;
+use std::io::{self, ErrorKind};
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use walkdir::WalkDir;
 
 /// How the names of hidden folders and files begin.
 pub(crate) const HOLDING: &str = ".planish-taken-";
 
-/// Names that are tried to find a free one; others cannot guess them.
-const ATTEMPTS: u32 = 100;
+/// What only its owner may do anything with.
+const PRIVATE: u32 = 0o700;
 
 /// Why inputs cannot be taken out of an inbox.
 #[derive(Debug, thiserror::Error)]
@@ -43,108 +37,90 @@ pub struct InboxError {
 }
 
 /// A holding folder.
-pub(crate) struct Holding<'a> {
-    folder: BorrowedFd<'a>,
+pub(crate) struct Holding<'a, F> {
+    folder: &'a F,
     name: OsString,
-    handle: File,
+    handle: F,
 }
 
-impl<'a> Holding<'a> {
+impl<'a, F: Folder> Holding<'a, F> {
     /// Makes one in an open folder.
-    pub(crate) fn make(folder: BorrowedFd<'a>) -> io::Result<Self> {
-        for _ in 0..ATTEMPTS {
-            let name = OsString::from(format!("{HOLDING}{:016x}", RandomState::new().hash_one(())));
-            match mkdirat(folder, &name, Mode::RWXU) {
-                Err(Errno::EXIST) => {}
-                Err(error) => return Err(error.into()),
-                Ok(()) => return Self::just_made(folder, &name),
-            }
-        }
-        Err(Errno::EXIST.into())
+    pub(crate) fn make(folder: &'a F) -> io::Result<Self> {
+        let (name, ()) = disk::make_unique(HOLDING, |name| folder.make_folder(name, PRIVATE))?;
+        Self::just_made(folder, &name)
     }
 
     /// Opens one that should be as it was made.
-    fn just_made(folder: BorrowedFd<'a>, name: &OsStr) -> io::Result<Self> {
-        let made = Self::open(folder, name)?.filter(Self::is_empty);
-        if made.is_none() {
+    fn just_made(folder: &'a F, name: &OsStr) -> io::Result<Self> {
+        let made = match Self::open(folder, name) {
+            Ok(made) => made.filter(Self::is_empty).ok_or_else(not_private),
+            Err(error) => Err(error),
+        };
+        if made.is_err() {
             // Fails where something else has taken its place, and then shall.
-            let _ = unlinkat(folder, name, AtFlags::REMOVEDIR);
+            let _ = folder.remove_folder(name);
         }
-        made.ok_or_else(not_private)
+        made
     }
 
     /// Opens one. None: it is no folder that only this user can have made and filled.
-    fn open(folder: BorrowedFd<'a>, name: &OsStr) -> io::Result<Option<Self>> {
-        let handle = match regular::folder_in(folder, name) {
-            // What a link is told to be where none is followed differs from system to system.
-            Err(error) if is_no_folder(&error) => return Ok(None),
+    fn open(folder: &'a F, name: &OsStr) -> io::Result<Option<Self>> {
+        let handle = match folder.open_folder(name) {
+            Err(error) if disk::is_no_folder(&error) => return Ok(None),
             opened => opened?,
         };
-        let is_ours = is_private(&handle.metadata()?);
+        let is_ours = is_private(&handle.stat()?);
         Ok(is_ours.then(|| Self { folder, name: name.to_owned(), handle }))
     }
 
     fn is_empty(&self) -> bool {
-        self.names().is_ok_and(|names| names.is_empty())
-    }
-
-    /// What is in it.
-    fn names(&self) -> io::Result<Vec<OsString>> {
-        let mut names = Vec::new();
-        for entry in Dir::read_from(&self.handle)? {
-            let entry = entry?;
-            let name = OsStr::from_bytes(entry.file_name().to_bytes());
-            if name != "." && name != ".." {
-                names.push(name.to_owned());
-            }
-        }
-        Ok(names)
+        self.handle.list().is_ok_and(|names| names.is_empty())
     }
 
     /// Takes what has this name in the folder.
     pub(crate) fn take(&self, name: &OsStr) -> io::Result<()> {
-        Ok(renameat(self.folder, name, &self.handle, name)?)
+        self.folder.rename(name, &self.handle, name, disk::Rename::Over)
     }
 
     /// Opens what is held under this name.
-    pub(crate) fn open_held(&self, name: &OsStr) -> Result<File, OpenError> {
-        regular::open_in(&self.handle, name)
+    pub(crate) fn open_held(&self, name: &OsStr) -> Result<F::File, OpenError> {
+        self.handle.open_file(name)
     }
 
     /// Whether something of this name is held, or in the folder.
     pub(crate) fn is_there(&self, name: &OsStr) -> bool {
-        [self.handle.as_fd(), self.folder].iter().any(|at| statat(at, name, AtFlags::SYMLINK_NOFOLLOW).is_ok())
+        [&self.handle, self.folder].iter().any(|at| at.stat_of(name).is_ok())
     }
 
     /// Deletes what is held under this name. That it is gone already is no failure: another daemon, starting, may have
     /// given it back.
     pub(crate) fn delete(&self, name: &OsStr) -> io::Result<()> {
-        match unlinkat(&self.handle, name, AtFlags::empty()) {
-            Ok(()) | Err(Errno::NOENT) => Ok(()),
-            Err(error) => Err(error.into()),
+        match self.handle.unlink(name) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+            Ok(()) | Err(_) => Ok(()),
         }
     }
 
     /// Gives back what is held under this name, unless something newer has its name: then it goes, if it is a file.
     pub(crate) fn give_back(&self, name: &OsStr) -> io::Result<()> {
-        match rename_to_free(self.handle.as_fd(), name, self.folder) {
-            Err(Errno::EXIST) if self.holds_file(name)? => self.delete(name),
-            ended => Ok(ended?),
+        match disk::rename_to_free(&self.handle, name, self.folder, name) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists && self.holds_file(name)? => self.delete(name),
+            ended => ended,
         }
     }
 
     fn holds_file(&self, name: &OsStr) -> io::Result<bool> {
-        is_file(self.handle.as_fd(), name)
+        Ok(self.handle.stat_of(name)?.is_file())
     }
 
     /// Gives back all files, and removes the folder; whether nothing else was in it.
     fn give_all_back(&self) -> io::Result<bool> {
-        for name in self.names()? {
+        for name in self.handle.list()? {
             if self.holds_file(&name)? {
                 self.give_back(&name)?;
             }
         }
-        let is_empty = self.names()?.is_empty();
+        let is_empty = self.handle.list()?.is_empty();
         if is_empty {
             self.remove();
         }
@@ -153,7 +129,7 @@ impl<'a> Holding<'a> {
 
     /// Removes the folder. Where somebody gave its name to something else, or something is left in it, that stays.
     pub(crate) fn remove(&self) {
-        if let Err(error) = unlinkat(self.folder, &self.name, AtFlags::REMOVEDIR) {
+        if let Err(error) = self.folder.remove_folder(&self.name) {
             tracing::debug!(folder = shown(self.name.as_ref()), %error, "a holding folder is left to the next start");
         }
     }
@@ -165,63 +141,41 @@ fn not_private() -> io::Error {
     )
 }
 
-/// Whether what was opened is no folder, or a link.
-fn is_no_folder(error: &io::Error) -> bool {
-    let codes = [Errno::NOTDIR, Errno::LOOP, Errno::MLINK].map(Errno::raw_os_error);
-    error.raw_os_error().is_some_and(|code| codes.contains(&code))
-}
-
 /// Whether something belongs to this user, and nobody else may do anything with it.
-fn is_private(metadata: &Metadata) -> bool {
-    metadata.uid() == geteuid().as_raw() && metadata.mode() & 0o077 == 0
-}
-
-/// Whether this name is that of a regular file.
-fn is_file(folder: BorrowedFd, name: &OsStr) -> io::Result<bool> {
-    let found = statat(folder, name, AtFlags::SYMLINK_NOFOLLOW)?;
-    Ok(FileType::from_raw_mode(found.st_mode) == FileType::RegularFile)
-}
-
-/// Moves something to another folder, where its name must be free.
-fn rename_to_free(from: BorrowedFd, name: &OsStr, to: BorrowedFd) -> Result<(), Errno> {
-    #[cfg(target_os = "linux")]
-    match rustix::fs::renameat_with(from, name, to, name, rustix::fs::RenameFlags::NOREPLACE) {
-        // Not every file system can do that.
-        Err(Errno::INVAL | Errno::NOSYS | Errno::OPNOTSUPP) => {}
-        ended => return ended,
-    }
-    linkat(from, name, to, name, AtFlags::empty())?;
-    unlinkat(from, name, AtFlags::empty())
+fn is_private(found: &Stat) -> bool {
+    found.owner == geteuid().as_raw() && found.mode & 0o077 == 0
 }
 
 /// Tries whether inputs can be taken out of an inbox.
 ///
 /// # Errors
 /// [`InboxError`]: why not, and what to do.
-pub fn try_out(inbox: &Path) -> Result<(), InboxError> {
+pub fn try_out(disk: &impl Disk, inbox: &Path) -> Result<(), InboxError> {
     let failed = |error| InboxError { inbox: inbox.to_owned(), error };
-    let folder = regular::folder_below(inbox, Path::new("")).map_err(|e| failed(e.into_io()))?;
-    Holding::make(folder.as_fd()).map(|holding| holding.remove()).map_err(failed)
+    let folder = disk.open(inbox).map_err(failed)?;
+    Holding::make(&folder).map(|holding| holding.remove()).map_err(failed)
 }
 
 /// Gives back what was held when the program was killed, in `inbox` and, if asked, in its sub-folders. What is not ours
 /// under such a name is left alone, and told.
-pub fn recover(inbox: &Path, recursive: bool) {
-    for_all_left(inbox, recursive, restore);
+pub fn recover(disk: &impl Disk, inbox: &Path, recursive: bool) {
+    for_all_left(disk, inbox, recursive, restore);
 }
 
 /// Clears what was being copied to `destination`, and if asked to its sub-folders, when the program was killed. What
 /// was held there, as in an inbox, is given back; what is not ours is left alone, and told.
-pub fn clear(destination: &Path, recursive: bool) {
-    for_all_left(destination, recursive, |folder, name| {
-        if is_file(folder, name)? { remove_copy(folder, name) } else { restore(folder, name) }
+pub fn clear(disk: &impl Disk, destination: &Path, recursive: bool) {
+    for_all_left(disk, destination, recursive, |folder, name| {
+        if folder.stat_of(name)?.is_file() { remove_copy(folder, name) } else { restore(folder, name) }
     });
 }
 
 /// Does `work` on everything in `top` that is named as what a killed program leaves: its folder, and its name there.
-fn for_all_left(top: &Path, recursive: bool, work: impl Fn(BorrowedFd, &OsStr) -> io::Result<bool>) {
-    for path in all_left(top, recursive) {
-        match work_on(top, &path, &work) {
+fn for_all_left<D: Disk>(disk: &D, top: &Path, recursive: bool, work: impl Fn(&D::Folder, &OsStr) -> io::Result<bool>) {
+    let mut left = Vec::new();
+    add_left(disk, top, Path::new(""), recursive, &mut left);
+    for path in left {
+        match work_on(disk, top, &path, &work) {
             Ok(true) => {}
             Ok(false) => tracing::warn!(
                 path = shown(&top.join(path)),
@@ -236,41 +190,48 @@ fn for_all_left(top: &Path, recursive: bool, work: impl Fn(BorrowedFd, &OsStr) -
     }
 }
 
-fn work_on(top: &Path, path: &Path, work: impl Fn(BorrowedFd, &OsStr) -> io::Result<bool>) -> io::Result<bool> {
+fn work_on<D: Disk>(
+    disk: &D,
+    top: &Path,
+    path: &Path,
+    work: impl Fn(&D::Folder, &OsStr) -> io::Result<bool>,
+) -> io::Result<bool> {
     let (Some(above), Some(name)) = (path.parent(), path.file_name()) else { return Ok(false) };
-    let folder: OwnedFd = regular::folder_below(top, above).map_err(OpenError::into_io)?;
-    work(folder.as_fd(), name)
+    let folder = disk::below(disk.open(top)?, above).map_err(OpenError::into_io)?;
+    work(&folder, name)
 }
 
-/// The paths, below `top`, of all that is named as what a killed program leaves.
-fn all_left(top: &Path, recursive: bool) -> Vec<PathBuf> {
-    let is_left = |name: &OsStr| name.as_bytes().starts_with(HOLDING.as_bytes());
-    let depth = if recursive { usize::MAX } else { 1 };
-    let mut left = Vec::new();
-    for entry in WalkDir::new(top).min_depth(1).max_depth(depth).into_iter().filter_map(Result::ok) {
-        let Ok(path) = entry.path().strip_prefix(top) else { continue };
-        // What is in such a folder is a matter of the folder.
-        let is_inside = path.parent().is_some_and(|above| above.iter().any(is_left));
-        if is_left(entry.file_name()) && !is_inside {
-            left.push(path.to_owned());
+/// Adds the paths, below `top`, of all in the folder `at` that is named as what a killed program leaves. What is in such
+/// a folder is a matter of the folder. A folder that cannot be read is passed over.
+fn add_left<D: Disk>(disk: &D, top: &Path, at: &Path, recursive: bool, left: &mut Vec<PathBuf>) {
+    // Each is opened anew from the top, so that deep trees need no more handles than flat ones.
+    let opened = disk.open(top).map_err(OpenError::Io).and_then(|top| disk::below(top, at));
+    let Ok(folder) = opened else { return };
+    let mut folders = Vec::new();
+    for name in folder.list().unwrap_or_default() {
+        if name.as_bytes().starts_with(HOLDING.as_bytes()) {
+            left.push(at.join(name));
+        } else if recursive && folder.stat_of(&name).is_ok_and(|found| found.is_folder()) {
+            folders.push(at.join(name));
         }
     }
-    left
+    drop(folder);
+    folders.iter().for_each(|below| add_left(disk, top, below, recursive, left));
 }
 
 /// Gives back what a folder holds; whether that was all there is.
-fn restore(folder: BorrowedFd, name: &OsStr) -> io::Result<bool> {
+fn restore<F: Folder>(folder: &F, name: &OsStr) -> io::Result<bool> {
     Holding::open(folder, name)?.map_or(Ok(false), |holding| holding.give_all_back())
 }
 
 /// Removes a copy that was not completed, if it is ours; whether it was.
-fn remove_copy(folder: BorrowedFd, name: &OsStr) -> io::Result<bool> {
-    let is_ours = match regular::open_in(folder, name) {
-        Ok(file) => is_private(&file.metadata()?),
+fn remove_copy<F: Folder>(folder: &F, name: &OsStr) -> io::Result<bool> {
+    let is_ours = match folder.open_file(name) {
+        Ok(file) => is_private(&file.stat()?),
         Err(_) => false,
     };
     if is_ours {
-        unlinkat(folder, name, AtFlags::empty())?;
+        folder.unlink(name)?;
     }
     Ok(is_ours)
 }
@@ -278,9 +239,11 @@ fn remove_copy(folder: BorrowedFd, name: &OsStr) -> io::Result<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rustix::fs::{CWD, mknodat};
+    use crate::disk::System;
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
     use std::fs::{self, Permissions};
-    use std::os::unix::fs::{PermissionsExt, symlink};
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+    use walkdir::WalkDir;
 
     /// A folder with an inbox `in` in it.
     fn place() -> tempfile::TempDir {
@@ -314,9 +277,9 @@ mod tests {
             write(&inbox.join(holding).join(name), "held", 0o644);
         }
         write(&inbox.join("sub/b.stl"), "newer", 0o644);
-        recover(&inbox, false);
+        recover(&System, &inbox, false);
         assert!(!inbox.join("sub/a.stl").exists(), "not asked for");
-        recover(&inbox, true);
+        recover(&System, &inbox, true);
         assert_eq!(all(&inbox), ["sub", "sub/a.stl", "sub/b.stl"]);
         assert_eq!(fs::read_to_string(inbox.join("sub/a.stl")).expect("there"), "held");
         assert_eq!(fs::read_to_string(inbox.join("sub/b.stl")).expect("there"), "newer");
@@ -333,7 +296,7 @@ mod tests {
         write(&place.path().join("private/b.stl"), "b", 0o600);
         write(&inbox.join(".planish-taken-file"), "c", 0o600);
         let before = all(place.path());
-        recover(&inbox, true);
+        recover(&System, &inbox, true);
         assert_eq!(all(place.path()), before);
     }
 
@@ -348,7 +311,7 @@ mod tests {
             eprintln!("skipped: only root can give files away");
             return;
         }
-        recover(&inbox, true);
+        recover(&System, &inbox, true);
         assert_eq!(all(&inbox), [".planish-taken-1", ".planish-taken-1/a.stl"]);
     }
 
@@ -363,7 +326,7 @@ mod tests {
         symlink("../../secret", ours.join("link.stl")).expect("linked");
         mknodat(CWD, ours.join("pipe.stl"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("made");
         write(&ours.join("a.stl"), "a", 0o644);
-        recover(&inbox, true);
+        recover(&System, &inbox, true);
         let left = ["", "/link.stl", "/pipe.stl"].map(|name| format!(".planish-taken-1{name}"));
         assert_eq!(all(&inbox), [&left[..], &["a.stl".to_owned()]].concat());
     }
@@ -382,9 +345,9 @@ mod tests {
         held(&done.join(".planish-taken-3"), 0o700);
         held(&done.join(".planish-taken-4"), 0o755);
         write(&done.join(".planish-taken-3/b.stl"), "b", 0o644);
-        clear(&done, false);
+        clear(&System, &done, false);
         assert!(done.join("sub/.planish-taken-2").exists(), "not asked for");
-        clear(&done, true);
+        clear(&System, &done, true);
         let left = [".planish-taken-4", ".planish-taken-link", ".planish-taken-open", "a.stl", "b.stl", "sub"];
         assert_eq!(all(&done), left);
     }
@@ -393,8 +356,8 @@ mod tests {
     fn a_holding_folder_is_for_its_owner_alone_and_known_by_its_handle() {
         let place = place();
         let inbox = place.path().join("in");
-        let folder = regular::folder_below(&inbox, Path::new("")).expect("there");
-        let holding = Holding::make(folder.as_fd()).expect("made");
+        let folder = System.open(&inbox).expect("there");
+        let holding = Holding::make(&folder).expect("made");
         let path = inbox.join(&holding.name);
         assert_eq!(fs::metadata(&path).expect("there").mode() & 0o777, 0o700);
         write(&inbox.join("a.stl"), "a", 0o644);
@@ -413,9 +376,9 @@ mod tests {
     #[test]
     fn an_inbox_is_tried_out_without_a_trace() {
         let place = place();
-        try_out(&place.path().join("in")).expect("it can be written");
+        try_out(&System, &place.path().join("in")).expect("it can be written");
         assert_eq!(all(place.path()), ["in"]);
-        let told = try_out(&place.path().join("gone")).expect_err("not there").to_string();
+        let told = try_out(&System, &place.path().join("gone")).expect_err("not there").to_string();
         assert!(told.contains("gone") && told.contains("--inputs keep"), "{told}");
     }
 }

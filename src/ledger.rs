@@ -1,9 +1,10 @@
 //! The ledger: which inputs are done. There is no other one than the published reports.
 
+use crate::disk::{Disk, File, Folder, System};
 use crate::outcome::{Code, Reason, Status};
 use crate::regular::{self, OpenError};
 use crate::report::{self, Input, Output, Report};
-use crate::stages::{Folder, read_file};
+use crate::stages::{Folder as Beside, read_file};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use walkdir::{DirEntry, WalkDir};
@@ -11,8 +12,14 @@ use walkdir::{DirEntry, WalkDir};
 /// The report published in `folder`, if it is that of the same content, settings and version as `fresh`, of a file and
 /// those `beside` it, and its files are there, unharmed. A failure is none: another version may do better, or another
 /// day; but planish does not die twice of the same. Nor is a refusal for a limit, which may have been raised since.
-pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Folder) -> Option<Report> {
-    let older: Report = serde_json::from_slice(&read_file(&folder.join(report::FILE)).ok()?).ok()?;
+pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Beside) -> Option<Report> {
+    up_to_date_in(&System.open(folder).ok()?, fresh, beside)
+}
+
+/// As [`up_to_date`], in an open folder.
+pub fn up_to_date_in<F: Folder>(folder: &F, fresh: &Report, beside: &Beside) -> Option<Report> {
+    let text = folder.follow_file(report::FILE).and_then(|file| regular::read(&file, u64::MAX));
+    let older: Report = serde_json::from_slice(&text.ok()?).ok()?;
     let same = Input { beside: vec![], ..older.input.clone() } == fresh.input
         && fresh.input.blake3.is_some()
         // The same content names the same files beside it.
@@ -20,7 +27,7 @@ pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Folder) -> Option<Repo
         && older.settings == fresh.settings
         && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
         && is_final(&older);
-    let there = |o: &Output| holds(folder, o).is_ok_and(|it_does| it_does);
+    let there = |o: &Output| holds_in(folder, o).is_ok_and(|it_does| it_does);
     let complete = (older.status == Status::Certified) != older.outputs.is_empty();
     (same && complete && older.outputs.iter().all(there)).then_some(older)
 }
@@ -39,8 +46,12 @@ pub fn is_final(report: &Report) -> bool {
 /// # Errors
 /// Why it cannot be read.
 pub fn holds(folder: &Path, output: &Output) -> Result<bool, OpenError> {
-    let file = regular::open(&folder.join(&output.file))?;
-    if file.metadata()?.len() != output.bytes {
+    holds_in(&System.open(folder)?, output)
+}
+
+fn holds_in<F: Folder>(folder: &F, output: &Output) -> Result<bool, OpenError> {
+    let file = folder.follow_file(&output.file)?;
+    if file.stat()?.bytes != output.bytes {
         return Ok(false);
     }
     match regular::read(&file, output.bytes) {

@@ -1,5 +1,6 @@
 //! What a look at a file shows: enough to tell whether it changed since.
 
+use crate::disk::Stat;
 use serde::{Deserialize, Serialize};
 use std::fs::Metadata;
 use std::io;
@@ -19,6 +20,21 @@ pub struct Look {
 pub struct Identity([u64; 2]);
 
 impl Identity {
+    /// By the numbers of its device and of itself on that.
+    pub fn new(device: u64, number: u64) -> Self {
+        Self([device, number])
+    }
+
+    /// The number of the device that it is on.
+    pub fn device(self) -> u64 {
+        self.0[0]
+    }
+
+    /// Its number on its device.
+    pub fn number(self) -> u64 {
+        self.0[1]
+    }
+
     /// By what the system says of it.
     #[cfg(unix)]
     pub fn of(metadata: &Metadata) -> Self {
@@ -59,6 +75,11 @@ impl Look {
         let since = metadata.modified().ok().and_then(|t| t.duration_since(std::time::UNIX_EPOCH).ok());
         let modified = since.map_or((0, 0), |d| (d.as_secs() as i64, i64::from(d.subsec_nanos())));
         Self { bytes: metadata.len(), identity: Identity::of(metadata), times: [modified; 2] }
+    }
+
+    /// What a look through [`crate::disk`] shows.
+    pub fn of_stat(stat: &Stat) -> Self {
+        Self { bytes: stat.bytes, identity: stat.identity, times: [stat.modified, stat.changed] }
     }
 
     /// Whether this is the same file with the same content, perhaps under another name: a rename changes nothing else.

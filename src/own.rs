@@ -5,39 +5,60 @@
 //! only what is a real folder or a regular file is taken for ours. And whoever may read a file may lock it: lock files
 //! are readable by their owner only, and nobody waits for a lock for ever.
 
+use crate::disk::{self, Disk, File, Folder, OPEN_FOLDER};
 use crate::regular;
-use rustix::fs::{CWD, FileType, Mode, OFlags, fchmod, fstat, openat};
+use rustix::fs::CWD;
 use rustix::io::Errno;
-use std::fs::{self, File, TryLockError};
+use std::ffi::OsStr;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Others may neither read nor write.
-const PRIVATE: Mode = Mode::RUSR.union(Mode::WUSR);
+const PRIVATE: u32 = 0o600;
 
-/// How long the lock of an output folder is waited for. Whoever holds one does so for milliseconds mostly; but disks may be slow, and what
-/// people put into a result may have to be copied.
+/// How long the lock of an output folder is waited for. Whoever holds one does so for milliseconds mostly; but disks may
+/// be slow, and what people put into a result may have to be copied.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The longest pause between two looks at a lock.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Makes the folder at `path`, and those above it, unless a real one is there.
+/// Opens the folder at `path`; makes it, and those above it, unless a real one is there.
 ///
 /// # Errors
 /// The system refuses, or something else is there: a link, too.
-pub fn folder(path: &Path) -> io::Result<()> {
-    fs::create_dir_all(path.parent().unwrap_or(path))?;
-    match fs::create_dir(path) {
-        Err(e) if e.kind() == ErrorKind::AlreadyExists => {
-            let is_real = fs::symlink_metadata(path)?.is_dir();
-            let other =
-                || io::Error::other("it is no folder, or a link to one; remove it, or use another output folder");
-            is_real.then_some(()).ok_or_else(other)
+pub fn folder<D: Disk>(disk: &D, path: &Path) -> io::Result<D::Folder> {
+    let above = disk::make_all(disk, path.parent().unwrap_or(path))?;
+    let name = path.file_name().unwrap_or_default();
+    let opened = match above.open_folder(name) {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            made_or_there(above.make_folder(name, OPEN_FOLDER))?;
+            above.sync()?;
+            above.open_folder(name)
         }
+        opened => opened,
+    };
+    opened.map_err(|error| {
+        let told = "it is no folder, or a link to one; remove it, or use another output folder";
+        if disk::is_no_folder(&error) { io::Error::other(told) } else { error }
+    })
+}
+
+/// Somebody else may make the same folder in the same moment.
+fn made_or_there(made: io::Result<()>) -> io::Result<()> {
+    match made {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => Ok(()),
         made => made,
     }
+}
+
+/// As [`open_lock`], in the folder at a path.
+///
+/// # Errors
+/// As [`open_lock`].
+pub fn lock_file(folder: &Path, name: &str) -> io::Result<std::fs::File> {
+    open_lock(&regular::folder_in(CWD, folder.as_os_str())?, name.as_ref())
 }
 
 /// Opens the lock file `name` in `folder`; makes it where it is missing. Nothing in it changes, and only its owner may
@@ -45,35 +66,32 @@ pub fn folder(path: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// The system refuses, or it is no regular file.
-pub fn lock_file(folder: &Path, name: &str) -> io::Result<File> {
-    open_lock(folder, name, OFlags::CREATE)
+pub fn open_lock<F: Folder>(folder: &F, name: &OsStr) -> io::Result<F::File> {
+    checked(folder.open_private(name, true))
 }
 
-/// As [`lock_file`], of a file that is there.
+/// As [`open_lock`], of a file that is there.
 ///
 /// # Errors
-/// As [`lock_file`].
-pub fn lock_file_there(folder: &Path, name: &str) -> io::Result<File> {
-    open_lock(folder, name, OFlags::empty())
+/// As [`open_lock`].
+pub fn open_lock_there<F: Folder>(folder: &F, name: &OsStr) -> io::Result<F::File> {
+    checked(folder.open_private(name, false))
 }
 
-fn open_lock(folder: &Path, name: &str, more: OFlags) -> io::Result<File> {
-    let folder = regular::folder_in(CWD, folder.as_os_str())?;
-    // To read and to write: so a pipe opens at once, and is told from a file then.
-    let flags = regular::FLAGS | OFlags::NOFOLLOW | OFlags::RDWR | more;
-    let file = openat(&folder, name, flags, PRIVATE).map_err(|e| match e {
-        Errno::LOOP => io::Error::other("it is a link, which is not followed; remove it"),
-        e => e.into(),
+fn checked<F: File>(opened: io::Result<F>) -> io::Result<F> {
+    let file = opened.map_err(|error| match Errno::from_io_error(&error) {
+        Some(Errno::LOOP) => io::Error::other("it is a link, which is not followed; remove it"),
+        _ => error,
     })?;
-    let found = fstat(&file)?;
-    if FileType::from_raw_mode(found.st_mode) != FileType::RegularFile {
+    let found = file.stat()?;
+    if !found.is_file() {
         return Err(io::Error::other("it is no regular file; remove it"));
     }
-    if Mode::from_raw_mode(found.st_mode) != PRIVATE {
+    if found.mode != PRIVATE {
         // Of an older version, or of somebody else, whose permissions are not ours to change.
-        let _ = fchmod(&file, PRIVATE);
+        let _ = file.set_mode(PRIVATE);
     }
-    Ok(File::from(file))
+    Ok(file)
 }
 
 /// Locks a file with this path if that is possible within `patience`, and as long as it is `wanted`; whether it is locked.
@@ -81,15 +99,15 @@ fn open_lock(folder: &Path, name: &str, more: OFlags) -> io::Result<File> {
 ///
 /// # Errors
 /// The system refuses.
-pub fn lock(file: &File, path: &Path, patience: Duration, wanted: impl Fn() -> bool) -> io::Result<bool> {
+pub fn lock(file: &impl File, path: &Path, patience: Duration, wanted: impl Fn() -> bool) -> io::Result<bool> {
     let began = Instant::now();
     let (mut pause, mut is_told) = (Duration::from_millis(1), false);
     loop {
-        match file.try_lock() {
-            Ok(()) => return Ok(true),
-            Err(TryLockError::Error(error)) => return Err(error),
-            Err(TryLockError::WouldBlock) if !wanted() || began.elapsed() >= patience => return Ok(false),
-            Err(TryLockError::WouldBlock) => {}
+        if file.lock_now()? {
+            return Ok(true);
+        }
+        if !wanted() || began.elapsed() >= patience {
+            return Ok(false);
         }
         if began.elapsed() > Duration::from_secs(1) && !std::mem::replace(&mut is_told, true) {
             tracing::warn!(lock = crate::shown::shown(path), "waits for a lock that another process holds");
@@ -102,7 +120,9 @@ pub fn lock(file: &File, path: &Path, patience: Duration, wanted: impl Fn() -> b
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rustix::fs::mknodat;
+    use crate::disk::System;
+    use rustix::fs::{FileType, Mode, mknodat};
+    use std::fs;
     use std::os::unix::fs::{PermissionsExt, symlink};
 
     #[test]
@@ -117,11 +137,12 @@ mod tests {
             assert_eq!(fs::metadata(at(name)).expect("there").permissions().mode() & 0o777, 0o600, "{name}");
         }
         symlink("old", at("link")).expect("linked");
-        mknodat(CWD, at("pipe"), FileType::Fifo, PRIVATE, 0).expect("made");
+        mknodat(CWD, at("pipe"), FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).expect("made");
         for name in ["link", "pipe", "."] {
             assert!(lock_file(folder.path(), name).is_err(), "{name}");
         }
-        assert!(lock_file_there(folder.path(), "missing").is_err() && !at("missing").exists());
+        let opened = System.open(folder.path()).expect("there");
+        assert!(open_lock_there(&opened, "missing".as_ref()).is_err() && !at("missing").exists());
         symlink(".", at("folder")).expect("linked");
         assert!(lock_file(&at("folder"), "old").is_err(), "nor through a link");
     }
@@ -130,10 +151,10 @@ mod tests {
     fn a_folder_is_made_and_a_link_is_none() {
         let place = tempfile::tempdir().expect("a folder");
         let at = |name: &str| place.path().join(name);
-        folder(&at("a/b")).and_then(|()| folder(&at("a/b"))).expect("made, and there");
+        (0..2).for_each(|_| drop(folder(&System, &at("a/b")).expect("made, and there")));
         symlink("a", at("link")).expect("linked");
         fs::write(at("file"), "").expect("written");
-        assert!(folder(&at("link")).is_err() && folder(&at("file")).is_err());
+        assert!(folder(&System, &at("link")).is_err() && folder(&System, &at("file")).is_err());
     }
 
     #[test]

@@ -3,60 +3,90 @@
 //! The files of an input are written to a staging folder (`OUT/.planish/...`), brought to disk, and renamed into
 //! place in one step; an older result stays until then, and what is not planish's in it moves on ([`crate::replace`]).
 //! Each process has a staging folder of its own, held by a lock; folders whose process is gone are cleared at the next
-//! start. What is published is the ledger of what was done: see [`crate::ledger`].
+//! start ([`crate::staging`]), and one that somebody removes is made anew. What is published is the ledger of what was
+//! done: see [`crate::ledger`].
+//!
+//! A result that is published is on disk: neither a kill nor a loss of power leaves half of one, or loses what is not
+//! planish's. Deliberately absent: any promise about disks that tell that they have written what they have not.
 
 use crate::begun;
+use crate::disk::{self, Disk, Folder, System};
+use crate::hooks;
 use crate::own;
-use crate::replace::{self, NotKept};
+use crate::passing;
+use crate::replace;
 use crate::shown::shown;
+use crate::staging::{self, Bury, Desk, GATE, Run, Settled};
 use parking_lot::Mutex;
+use rustix::io::Errno;
 use std::collections::BTreeSet;
-use std::ffi::OsString;
-use std::fs::{self, File};
-use std::io::{self, Write};
+use std::ffi::{OsStr, OsString};
+use std::io::{self, ErrorKind};
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 
 /// The hidden folder for what is not complete yet.
 pub const STAGING: &str = ".planish";
 
-/// The file whose lock tells that a staging folder is in use.
-const LOCK: &str = "lock";
-
-/// How the names of staging folders begin.
-const RUN: &str = "run-";
-
-/// The file whose lock a process holds while it makes its staging folder.
-const GATE: &str = "opening";
+/// The name and the content of a file.
+pub type Content = (String, Vec<u8>);
 
 /// Publishes results in one output folder.
 #[derive(Debug)]
-pub struct Publisher {
+pub struct Publisher<D: Disk = System> {
+    disk: D,
     out: PathBuf,
-    staging: tempfile::TempDir,
+    bury: Bury,
+    run: Mutex<Arc<Run<D::Folder>>>,
     /// Whether results may still be put in place; held while one is.
     open: Mutex<bool>,
-    _lock: File,
 }
 
-/// The folder of a result on its way into place; what is in it goes with this.
+/// A result on its way into place. It goes with this.
 #[derive(Debug)]
-pub struct Staged {
-    parent: tempfile::TempDir,
-    fresh: PathBuf,
+pub struct Staged<D: Disk = System> {
+    run: Arc<Run<D::Folder>>,
+    desk: Desk<D::Folder>,
 }
 
-impl Staged {
+impl<D: Disk> Staged<D> {
     /// Where its files go.
-    pub fn folder(&self) -> &Path {
-        &self.fresh
+    pub fn folder(&self) -> PathBuf {
+        self.desk.path_of_half(&self.run)
     }
+
+    /// Whether it is still there: somebody may have removed it.
+    pub fn is_there(&self) -> bool {
+        self.desk.half().is_ok() && self.folder().exists()
+    }
+}
+
+impl<D: Disk> Drop for Staged<D> {
+    fn drop(&mut self) {
+        self.desk.remove(&self.run);
+    }
+}
+
+/// Sees to it that what a dead process was about is known, and that nothing of it lives on.
+fn bury(staging: &Path) {
+    hooks::end_those_of(staging);
+    begun::take_over(staging);
+}
+
+/// Writes the files of a result to a folder, for another process that puts it in place.
+///
+/// # Errors
+/// [`PublishError`].
+pub fn write_to(folder: &Path, files: &[Content]) -> Result<(), PublishError> {
+    let half = System.open(folder).map_err(at(folder))?;
+    staging::write_all(&half, files).map_err(at(folder))
 }
 
 /// Why nothing could be published.
 #[derive(Debug, thiserror::Error)]
 pub enum PublishError {
     /// The system refuses.
-    #[error("cannot write {}: {error}; check that the disk has room and the folder may be written", shown(.path))]
+    #[error("cannot write {}: {error}; {}", shown(.path), remedy(.error))]
     Io {
         /// Where.
         path: PathBuf,
@@ -87,17 +117,42 @@ pub enum PublishError {
     /// A folder on the way is itself a result.
     #[error("{} is the result of an input: another result cannot lie in it; rename the folder in the inbox", shown(.0))]
     Nested(PathBuf),
+    /// The place of the result is another file system's.
+    #[error(
+        "{} is on another file system (a mount point?) than {STAGING} in the output folder: results are put in place by \
+         renaming; unmount it, or use another output folder", shown(.0)
+    )]
+    Elsewhere(PathBuf),
+    /// The program is ending.
+    #[error("nothing is published any more, as planish ends; start it again")]
+    Closed,
 }
 
 impl PublishError {
     /// Whether it stays as long as nobody changes something.
     pub fn is_lasting(&self) -> bool {
-        matches!(self, Self::Foreign(_) | Self::Nested(_) | Self::Stands(_))
+        match self {
+            Self::Foreign(_) | Self::Nested(_) | Self::Stands(_) | Self::Elsewhere(_) => true,
+            Self::Io { error, .. } => passing::lasts(error),
+            Self::Report(_) | Self::Busy(_) | Self::Closed => false,
+        }
+    }
+}
+
+/// What to do about an error of the system.
+fn remedy(error: &io::Error) -> &'static str {
+    match Errno::from_io_error(error) {
+        Some(Errno::NOTDIR) => "something on the way there is no folder: move it away, or use another output folder",
+        Some(Errno::NAMETOOLONG) => "the name is too long for that file system: give the input a shorter one",
+        Some(Errno::LOOP) => "links on the way there lead in circles, or where none is followed: remove them",
+        Some(Errno::ROFS) => "the file system may only be read: mount it for writing, or use another output folder",
+        Some(Errno::FBIG) => "a file is too large for that file system or for the limits of this process",
+        _ => "check that the disk has room and the folder may be written",
     }
 }
 
 /// Attaches the path to an I/O error.
-fn at(path: &Path) -> impl FnOnce(io::Error) -> PublishError {
+pub(crate) fn at(path: &Path) -> impl FnOnce(io::Error) -> PublishError {
     let path = path.to_owned();
     move |error| PublishError::Io { path, error }
 }
@@ -108,16 +163,24 @@ impl Publisher {
     /// # Errors
     /// [`PublishError`] where the folder cannot be written.
     pub fn open(out: &Path) -> Result<Self, PublishError> {
-        let staging = out.join(STAGING);
-        own::folder(&staging).map_err(at(&staging))?;
-        // One process at a time, so that a folder is never seen between being made and being locked.
-        let _opening = pass_gate(out, || true)?.ok_or_else(|| PublishError::Busy(staging.join(GATE)))?;
-        clear_stale(&staging);
-        let own = tempfile::Builder::new().prefix(RUN).tempdir_in(&staging).map_err(at(&staging))?;
-        let path = own.path().join(LOCK);
-        // It is new, and nobody else's.
-        let lock = own::lock_file(own.path(), LOCK).and_then(|f| f.lock().map(|()| f)).map_err(at(&path))?;
-        Ok(Self { out: out.to_owned(), staging: own, open: Mutex::new(true), _lock: lock })
+        Self::open_with(System, out, bury)
+    }
+}
+
+impl<D: Disk> Publisher<D> {
+    /// As [`Publisher::open`], on this disk, where no process has done anything else than publish.
+    ///
+    /// # Errors
+    /// As [`Publisher::open`].
+    pub fn open_on(disk: D, out: &Path) -> Result<Self, PublishError> {
+        Self::open_with(disk, out, |_| {})
+    }
+
+    fn open_with(disk: D, out: &Path, bury: Bury) -> Result<Self, PublishError> {
+        let run = Mutex::new(Arc::new(Run::make(&disk, out, bury, || true)?));
+        // A program that was killed may have made it, and not brought its name to disk.
+        disk::sync_name(&disk, out).map_err(at(out))?;
+        Ok(Self { disk, out: out.to_owned(), bury, run, open: Mutex::new(true) })
     }
 
     /// The output folder.
@@ -130,9 +193,26 @@ impl Publisher {
         self.out.join(name)
     }
 
-    /// A folder for files on their way into a result. It goes when the process ends.
-    pub fn staging(&self) -> &Path {
-        self.staging.path()
+    /// A folder for files on their way into a result. It goes when the process ends; where somebody has removed it, it is
+    /// made anew.
+    ///
+    /// # Errors
+    /// [`PublishError`] where it is gone and cannot be made.
+    pub fn staging(&self) -> Result<PathBuf, PublishError> {
+        Ok(self.run()?.path.clone())
+    }
+
+    fn run(&self) -> Result<Arc<Run<D::Folder>>, PublishError> {
+        let mut run = self.run.lock();
+        if !run.is_there(&self.disk).map_err(at(&run.path))? {
+            let is_open = || *self.open.lock();
+            if !is_open() {
+                return Err(PublishError::Closed);
+            }
+            tracing::warn!(folder = shown(&run.path), "the staging folder was removed: another one is made");
+            *run = Arc::new(Run::make(&self.disk, &self.out, self.bury, is_open)?);
+        }
+        Ok(run.clone())
     }
 
     /// Publishes `files` as the result of the input `name`, all at once, if it is still `wanted` when they are ready to
@@ -140,41 +220,39 @@ impl Publisher {
     ///
     /// # Errors
     /// [`PublishError`]; then an older result is untouched.
-    pub fn publish(
-        &self,
-        name: &Path,
-        files: &[(String, Vec<u8>)],
-        wanted: impl Fn() -> bool,
-    ) -> Result<bool, PublishError> {
+    pub fn publish(&self, name: &Path, files: &[Content], wanted: impl Fn() -> bool) -> Result<bool, PublishError> {
         self.admits(name)?;
-        let staged = self.room(name)?;
-        write_all(staged.folder(), files)?;
+        let staged = self.room()?;
+        let half = staged.desk.half().map_err(at(&staged.run.path))?;
+        staging::write_all(&half, files).map_err(at(&self.target(name)))?;
         self.put(name, &staged, wanted)
     }
 
-    /// Room for the files of the result of the input `name`, where they are not seen yet.
+    /// Room for the files of a result, where they are not seen yet.
     ///
     /// # Errors
     /// [`PublishError`] where it cannot be made.
-    pub fn room(&self, name: &Path) -> Result<Staged, PublishError> {
-        let parent = tempfile::tempdir_in(self.staging()).map_err(at(self.staging()))?;
-        let fresh = parent.path().join(name.file_name().unwrap_or_default());
-        fs::create_dir(&fresh).map_err(at(&fresh))?;
-        Ok(Staged { parent, fresh })
+    pub fn room(&self) -> Result<Staged<D>, PublishError> {
+        let run = self.run()?;
+        let desk = Desk::make(&run).map_err(at(&run.path))?;
+        let staged = Staged { run, desk };
+        staged.desk.make_half().map_err(at(&staged.run.path))?;
+        Ok(staged)
     }
 
     /// Puts files that are complete and on disk in the place of the result `name`, all at once, if it is still `wanted`
-    /// then. Whether they were.
+    /// then. Whether they were. What was not put in place for a reason that passes may be tried again.
     ///
     /// # Errors
     /// [`PublishError`]; then an older result is untouched.
-    pub fn put(&self, name: &Path, staged: &Staged, wanted: impl Fn() -> bool) -> Result<bool, PublishError> {
-        let Staged { parent, fresh } = staged;
+    pub fn put(&self, name: &Path, staged: &Staged<D>, wanted: impl Fn() -> bool) -> Result<bool, PublishError> {
+        let Staged { run, desk } = staged;
         let target = self.target(name);
+        let half = desk.half().map_err(at(&target))?;
         // One at a time, of all processes, so that what is no longer wanted never takes the place of what came after it.
         // Nobody who closes is kept waiting by a lock.
         let is_wanted = || *self.open.lock() && wanted();
-        let Some(_alone) = pass_gate(&self.out, is_wanted)? else {
+        let Some(_alone) = staging::pass_gate(&self.disk, &self.out, is_wanted)? else {
             return if is_wanted() { Err(PublishError::Busy(self.out.join(STAGING).join(GATE))) } else { Ok(false) };
         };
         let open = self.open.lock();
@@ -183,22 +261,29 @@ impl Publisher {
         }
         // Writing took its time: somebody may have put something there.
         let own = self.admits(name)?;
-        let folder = self.folder_for(name)?;
-        if keep_foreign(&target, &own, fresh, false)? > 0 {
-            sync_folder(fresh).map_err(at(fresh))?;
-        }
-        if let Some(older) = put_in_place(fresh, &target, parent.path()).map_err(at(&target))? {
-            // Nothing is lost of what was put there in this moment, either: where it cannot be kept, the older comes back.
-            let late = match fs::symlink_metadata(&older) {
-                Ok(m) if !m.is_dir() => Err(PublishError::Foreign(target.clone())),
-                _ => keep_foreign(&older, &own, &target, true),
-            };
-            if let Err(error) = late {
-                put_back(&older, &target, parent.path()).map_err(at(&older))?;
-                return Err(error);
+        let above = target.parent().unwrap_or(&self.out);
+        let folder = disk::make_all(&self.disk, above).map_err(at(above))?;
+        let last = name.file_name().unwrap_or_default();
+        match folder.open_folder(last) {
+            Ok(older) => {
+                staging::keep_foreign(&older, &target, &own, &half, false)?;
+                // It comes to lie on the desk, which must be found there.
+                run.folder.sync().map_err(at(&run.path))?;
             }
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(at(&target)(error)),
         }
-        sync_folder(&folder).map_err(at(&folder)).map(|()| true)
+        let promise = desk.complete(&half, name).map_err(at(&target))?;
+        let put = desk.put_in_place(&folder, last);
+        let settled = desk.settle(&self.disk, &self.out, &promise, Some(&own));
+        if put.is_err() && settled.is_ok() {
+            desk.take_back(&promise).map_err(at(&target))?;
+        }
+        put.map_err(|error| not_put(error, &folder, &target))?;
+        match settled? {
+            Settled::Newer => Ok(true),
+            Settled::Older(error) => Err(error),
+        }
     }
 
     /// Whether a result may be put in the place of `name`; and the names of what planish itself has written there.
@@ -207,35 +292,48 @@ impl Publisher {
     /// [`PublishError`]: what stands there.
     pub fn admits(&self, name: &Path) -> Result<BTreeSet<OsString>, PublishError> {
         let target = self.target(name);
-        let parents = name.ancestors().skip(1).filter(|p| !p.as_os_str().is_empty()).map(|p| self.out.join(p));
-        if let Some(result) = parents.into_iter().find(|p| replace::own_files(p).is_some()) {
-            return Err(PublishError::Nested(result));
+        if !is_plain(name) {
+            return Err(PublishError::Foreign(target));
         }
-        let own = if is_plain(name) { replaceable(&target) } else { None };
+        // From the output folder down.
+        let above: Vec<&Path> = name.ancestors().skip(1).filter(|part| !part.as_os_str().is_empty()).collect();
+        let mut folder = self.disk.open(&self.out).map_err(at(&self.out))?;
+        for part in above.into_iter().rev() {
+            let path = self.out.join(part);
+            folder = match self.disk.open(&path) {
+                Err(error) if error.kind() == ErrorKind::NotFound => return Ok(BTreeSet::new()),
+                Err(error) if disk::is_no_folder(&error) => return Err(PublishError::Foreign(path)),
+                opened => opened.map_err(at(&path))?,
+            };
+            if replace::own_files(&folder).map_err(at(&path))?.is_some() {
+                return Err(PublishError::Nested(path));
+            }
+        }
+        let own = replaceable(&folder, name.file_name().unwrap_or_default()).map_err(at(&target))?;
         own.ok_or(PublishError::Foreign(target))
+    }
+
+    /// Sees to it that a result that stands is on disk, though whoever published it may have been killed at once.
+    ///
+    /// # Errors
+    /// [`PublishError`] where the system refuses.
+    pub fn secure(&self, name: &Path) -> Result<(), PublishError> {
+        let above = name.parent().unwrap_or(Path::new(""));
+        disk::sync_down(&self.disk, &self.out, above).map_err(|(path, error)| at(&path)(error))
     }
 
     /// Nothing is put in place any more, and the staging folder goes. Whoever still writes to it hears of an error.
     pub fn close(&self) {
         *self.open.lock() = false;
-        if let Err(error) = fs::remove_dir_all(self.staging()) {
+        if let Err(error) = self.run.lock().remove(&self.disk, &self.out) {
             tracing::debug!(%error, "the staging folder is left to the next start");
         }
     }
+}
 
-    /// The folder in which the result `name` lies; made where it is missing.
-    fn folder_for(&self, name: &Path) -> Result<PathBuf, PublishError> {
-        let mut folder = self.out.clone();
-        for part in name.parent().into_iter().flat_map(Path::components) {
-            let above = folder.clone();
-            folder.push(part);
-            match fs::create_dir(&folder) {
-                Ok(()) => sync_folder(&above).map_err(at(&above))?,
-                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
-                Err(e) => return Err(at(&folder)(e)),
-            }
-        }
-        Ok(folder)
+impl<D: Disk> Drop for Publisher<D> {
+    fn drop(&mut self) {
+        self.close();
     }
 }
 
@@ -244,142 +342,40 @@ fn is_plain(name: &Path) -> bool {
     name.components().all(|part| matches!(part, Component::Normal(_))) && name.file_name().is_some()
 }
 
-/// The names of what planish has written to `target`: none of them where nothing is there, or an empty folder. None where
-/// it is neither that nor an older result (a folder with a report of planish).
-fn replaceable(target: &Path) -> Option<BTreeSet<OsString>> {
-    let nothing = Some(BTreeSet::new());
-    match fs::symlink_metadata(target) {
-        Err(e) => nothing.filter(|_| e.kind() == io::ErrorKind::NotFound),
-        Ok(m) if !m.is_dir() => None,
-        Ok(_) => replace::own_files(target)
-            .or_else(|| nothing.filter(|_| fs::read_dir(target).is_ok_and(|mut d| d.next().is_none()))),
-    }
-}
-
-/// What lies in the folder `older`, if that is there, and is not planish's own, gets a place in `fresh`, too; how much
-/// that is.
-fn keep_foreign(older: &Path, own: &BTreeSet<OsString>, fresh: &Path, again: bool) -> Result<usize, PublishError> {
-    if !fs::symlink_metadata(older).is_ok_and(|m| m.is_dir()) {
-        return Ok(0);
-    }
-    let kept = replace::keep_foreign(older, own, fresh, again).map_err(|e| match e {
-        NotKept::Stands(path) => PublishError::Stands(path),
-        NotKept::Io(path, error) => PublishError::Io { path, error },
-    })?;
-    if kept > 0 {
-        tracing::info!(result = shown(fresh), kept, "files that planish did not write stay in the result");
-    }
-    Ok(kept)
-}
-
-/// Opens and locks the gate of an output folder, as long as that is `wanted`; none where another process holds it for
-/// too long.
-fn pass_gate(out: &Path, wanted: impl Fn() -> bool) -> Result<Option<File>, PublishError> {
-    let folder = out.join(STAGING);
-    let path = folder.join(GATE);
-    let gate = own::lock_file(&folder, GATE).map_err(at(&path))?;
-    Ok(own::lock(&gate, &path, own::PATIENCE, wanted).map_err(at(&path))?.then_some(gate))
-}
-
-/// Writes the files of a result to `folder`, and brings them to disk.
-///
-/// # Errors
-/// [`PublishError`].
-pub fn write_all(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), PublishError> {
-    for (file, bytes) in files {
-        let path = folder.join(file);
-        write_synced(&path, bytes).map_err(at(&path))?;
-    }
-    sync_folder(folder).map_err(at(folder))
-}
-
-fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = File::create_new(path)?;
-    file.write_all(bytes)?;
-    file.sync_all()
-}
-
-fn sync_folder(path: &Path) -> io::Result<()> {
-    File::open(path)?.sync_all()
-}
-
-/// Renames `fresh` to `target` in one step. Where there is an older result the two change places, and the older one
-/// goes with the staging folder; where that lies now. Another process may put one there, or take it away, at any
-/// moment: then the other way is tried, a few times.
-#[cfg(target_os = "linux")]
-fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<Option<PathBuf>> {
-    use rustix::fs::{CWD, RenameFlags, renameat_with};
-    use rustix::io::Errno;
-    for _ in 0..16 {
-        match renameat_with(CWD, fresh, CWD, target, RenameFlags::NOREPLACE) {
-            Err(Errno::EXIST | Errno::NOTEMPTY) => {}
-            Err(Errno::INVAL | Errno::NOSYS) => break,
-            ended => return Ok(ended.map(|()| None)?),
-        }
-        match renameat_with(CWD, fresh, CWD, target, RenameFlags::EXCHANGE) {
-            Err(Errno::NOENT) => {}
-            Err(Errno::INVAL | Errno::NOSYS) => break,
-            ended => return Ok(ended.map(|()| Some(fresh.to_owned()))?),
-        }
-    }
-    put_in_place_in_two_steps(fresh, target, staging)
-}
-
-/// Where the system cannot exchange two folders, the older one is moved away first.
-#[cfg(not(target_os = "linux"))]
-fn put_in_place(fresh: &Path, target: &Path, staging: &Path) -> io::Result<Option<PathBuf>> {
-    put_in_place_in_two_steps(fresh, target, staging)
-}
-
-fn put_in_place_in_two_steps(fresh: &Path, target: &Path, staging: &Path) -> io::Result<Option<PathBuf>> {
-    let older = staging.join("older");
-    let moved = match fs::rename(target, &older) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
-        moved => moved.is_ok(),
+/// The names of what planish has written there: none of them where nothing is there, or an empty folder. None where it is
+/// neither that nor an older result (a folder with a report of planish).
+fn replaceable<F: Folder>(folder: &F, name: &OsStr) -> io::Result<Option<BTreeSet<OsString>>> {
+    let found = match folder.stat_of(name) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Some(BTreeSet::new())),
+        found => found?,
     };
-    match fs::rename(fresh, target) {
-        Ok(()) => Ok(moved.then_some(older)),
-        Err(error) => {
-            if moved {
-                fs::rename(&older, target)?;
-            }
-            Err(error)
-        }
+    if !found.is_folder() {
+        return Ok(None);
     }
+    let result = folder.open_folder(name)?;
+    if let Some(own) = replace::own_files(&result)? {
+        return Ok(Some(own));
+    }
+    Ok(result.list()?.is_empty().then(BTreeSet::new))
 }
 
-/// The older result comes back to its place; the newer one goes with the staging folder.
-fn put_back(older: &Path, target: &Path, staging: &Path) -> io::Result<()> {
-    fs::rename(target, staging.join("withdrawn"))?;
-    fs::rename(older, target)
-}
-
-/// Removes staging folders that are ours and whose lock nobody holds, and those that were made and never locked, which
-/// are empty. All else that lies there stays.
-fn clear_stale(staging: &Path) {
-    let Ok(entries) = fs::read_dir(staging) else { return };
-    let is_run =
-        |e: &fs::DirEntry| e.file_type().is_ok_and(|t| t.is_dir()) && e.file_name().to_string_lossy().starts_with(RUN);
-    for folder in entries.flatten().filter(is_run).map(|e| e.path()) {
-        let removed = match own::lock_file_there(&folder, LOCK).map(|lock| lock.try_lock().is_ok()) {
-            Ok(true) => {
-                begun::take_over(staging, &folder);
-                crate::hooks::end_those_of(&folder);
-                fs::remove_dir_all(&folder)
-            }
-            Ok(false) => Ok(()),
-            // Fails where something is in it.
-            Err(_) => fs::remove_dir(&folder),
-        };
-        if let Err(error) = removed {
-            tracing::warn!(folder = shown(&folder), "an abandoned staging folder is left alone: {error}");
-        }
+/// Why a result was not put in place.
+fn not_put<F: Folder>(error: io::Error, folder: &F, target: &Path) -> PublishError {
+    let device = |stat: io::Result<disk::Stat>| stat.ok().map(|stat| stat.identity.device());
+    let is_mount_point = || device(folder.stat()) != device(folder.stat_of(target.file_name().unwrap_or_default()));
+    match Errno::from_io_error(&error) {
+        Some(Errno::XDEV) => PublishError::Elsewhere(target.to_owned()),
+        Some(Errno::BUSY) if is_mount_point() => PublishError::Elsewhere(target.to_owned()),
+        _ => at(target)(error),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::disk::simulated::{Abilities, Simulated};
+    use crate::staging::LOCK;
+    use std::fs;
 
     /// A report of planish that names these files, and the files.
     fn result(of: &[(&str, &str)]) -> Vec<(String, Vec<u8>)> {
@@ -420,35 +416,6 @@ mod tests {
         let broken = vec![("b.txt".to_owned(), vec![]), ("no/such/folder.txt".to_owned(), vec![])];
         assert!(publisher.publish(name, &broken, || true).is_err());
         assert_eq!(fs::read_to_string(publisher.target(name).join("b.txt")).expect("there"), "old");
-    }
-
-    #[test]
-    fn systems_that_cannot_exchange_folders_are_served_in_two_steps() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let [fresh, target, staging] = ["fresh", "target", "staging"].map(|n| folder.path().join(n));
-        for text in ["first", "second"] {
-            fs::create_dir(&fresh).expect("made");
-            fs::write(fresh.join("a.txt"), text).expect("written");
-            let _ = fs::remove_dir_all(&staging);
-            fs::create_dir(&staging).expect("made");
-            put_in_place_in_two_steps(&fresh, &target, &staging).expect("placed");
-            assert_eq!(fs::read_to_string(target.join("a.txt")).expect("there"), text);
-        }
-    }
-
-    #[test]
-    fn an_older_result_comes_back_where_the_newer_one_cannot_stay() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let [fresh, target, staging] = ["fresh", "target", "staging"].map(|n| folder.path().join(n));
-        [&target, &staging].iter().for_each(|path| fs::create_dir(path).expect("made"));
-        fs::write(target.join("a.txt"), "old").expect("written");
-        let is_old = || fs::read_to_string(target.join("a.txt")).is_ok_and(|text| text == "old");
-        assert!(put_in_place_in_two_steps(&fresh, &target, &staging).is_err() && is_old(), "there is no newer one");
-        fs::create_dir(&fresh).expect("made");
-        let older = put_in_place(&fresh, &target, &staging).expect("placed").expect("one was there");
-        assert!(!is_old());
-        put_back(&older, &target, &staging).expect("put back");
-        assert!(is_old());
     }
 
     #[test]
@@ -506,13 +473,60 @@ mod tests {
     fn what_is_not_wanted_any_more_is_not_put_in_place() {
         let out = tempfile::tempdir().expect("a folder");
         let publisher = Publisher::open(out.path()).expect("opens");
-        let name = Path::new("part.stl");
+        let (name, staging) = (Path::new("part.stl"), publisher.staging().expect("there"));
         assert!(!publisher.publish(name, &files("new"), || false).expect("no error"));
-        assert_eq!(fs::read_dir(publisher.staging()).expect("there").count(), 1, "the lock only");
+        assert_eq!(fs::read_dir(&staging).expect("there").count(), 1, "the lock only");
         publisher.close();
         assert!(publisher.publish(name, &files("new"), || true).is_err(), "there is no place for it any more");
         assert!(!publisher.target(name).exists());
-        assert!(!publisher.staging().exists());
+        assert!(!staging.exists() && publisher.staging().is_err());
+    }
+
+    #[test]
+    fn staging_that_somebody_removes_is_made_anew() {
+        let out = tempfile::tempdir().expect("a folder");
+        let publisher = Publisher::open(out.path()).expect("opens");
+        let before = publisher.staging().expect("there");
+        for removed in [before.clone(), out.path().join(STAGING)] {
+            fs::remove_dir_all(&removed).expect("removed");
+            assert!(publisher.publish(Path::new("part.stl"), &files("new"), || true).expect("published"));
+            let staging = publisher.staging().expect("there");
+            assert!(staging.is_dir() && staging != before);
+            Publisher::open(out.path()).expect("opens beside the first");
+            assert!(staging.join(LOCK).exists(), "it is locked: nobody takes it for abandoned");
+        }
+        drop(publisher);
+        let hidden = fs::read_dir(out.path().join(STAGING)).expect("there").flatten().map(|e| e.file_name());
+        assert_eq!(hidden.collect::<Vec<_>>(), [GATE]);
+    }
+
+    #[test]
+    fn places_on_other_disks_are_told_as_such() {
+        for (mounted, name) in [("/out/a", "a/part.stl"), ("/out/part.stl", "part.stl")] {
+            let disk = Simulated::new(Abilities::ALL);
+            disk.mount(mounted);
+            let publisher = Publisher::open_on(disk.clone(), Path::new("/out")).expect("opens");
+            let refused = publisher.publish(Path::new(name), &files("new"), || true).expect_err("another disk");
+            assert!(matches!(refused, PublishError::Elsewhere(_)) && refused.is_lasting(), "{refused:?}");
+            assert!(refused.to_string().contains("unmount"), "{refused}");
+            drop(publisher);
+            assert!(!disk.all().keys().any(|path| path.contains("run-")), "nothing is left");
+        }
+    }
+
+    #[test]
+    fn what_lasts_is_told_from_what_passes() {
+        let out = tempfile::tempdir().expect("a folder");
+        let publisher = Publisher::open(out.path()).expect("opens");
+        fs::write(out.path().join("file"), "words").expect("written");
+        let refused = |name: &str| publisher.publish(Path::new(name), &files("new"), || true).expect_err("refused");
+        let below_file = refused("file/deep/part.stl");
+        assert!(matches!(&below_file, PublishError::Foreign(path) if path.ends_with("file")), "{below_file:?}");
+        let too_long = refused(&"n".repeat(300));
+        assert!(too_long.is_lasting() && too_long.to_string().contains("shorter"), "{too_long}");
+        for (errno, is_lasting) in [(Errno::NOSPC, false), (Errno::ACCESS, false), (Errno::NOTDIR, true)] {
+            assert_eq!(at(out.path())(errno.into()).is_lasting(), is_lasting, "{errno}");
+        }
     }
 
     #[test]
@@ -524,7 +538,7 @@ mod tests {
         let first = Publisher::open(out.path()).expect("opens");
         assert!(!abandoned.exists());
         let second = Publisher::open(out.path()).expect("opens beside the first");
-        assert!(first.staging.path().exists());
+        assert!(first.staging().expect("there").exists());
         second.publish(Path::new("b.stl"), &files("b"), || true).expect("published");
         first.publish(Path::new("a.stl"), &files("a"), || true).expect("published");
     }

@@ -4,14 +4,14 @@
 //! What is opened is looked at once more after it is opened, and that is what is read: so it does not matter what
 //! takes the place of a file, or of a folder on the way to it, after somebody has looked.
 
+use crate::disk::{self, Disk, System};
 use crate::shown::shown;
 use rustix::fd::{AsFd, OwnedFd};
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, openat, statat};
 use std::ffi::OsStr;
-use std::fs::{File, Metadata, Permissions};
+use std::fs::File;
 use std::io::{self, Read};
-use std::os::unix::fs::PermissionsExt;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Why a file is not read.
@@ -82,30 +82,16 @@ pub fn open_inside(folder: &Path, path: &Path) -> Result<File, OpenError> {
 /// # Errors
 /// [`OpenError`].
 pub fn open_below(folder: &Path, name: &Path) -> Result<File, OpenError> {
-    let at = folder_below(folder, name.parent().unwrap_or(Path::new("")))?;
+    let at = disk::below(System.open(folder)?, name.parent().unwrap_or(Path::new("")))?;
     open_in(&at, Path::new(name.file_name().ok_or(OpenError::NotRegular)?))
-}
-
-/// Opens the folder `name` below `folder` (or that itself, where `name` is empty), where there is no link on the way
-/// from there on.
-///
-/// # Errors
-/// [`OpenError`].
-pub fn folder_below(folder: &Path, name: &Path) -> Result<OwnedFd, OpenError> {
-    let mut at = openat(CWD, folder, FLAGS | OFlags::DIRECTORY, Mode::empty()).map_err(io::Error::from)?;
-    for part in name.components() {
-        let Component::Normal(part) = part else { return Err(OpenError::NotRegular) };
-        at = folder_in(&at, part)?.into();
-    }
-    Ok(at)
 }
 
 /// Opens the folder `name` in an open folder; it is no link.
 ///
 /// # Errors
 /// Where it is none, or must not be opened.
-pub fn folder_in(folder: impl AsFd, name: &OsStr) -> io::Result<File> {
-    Ok(File::from(openat(folder, name, FLAGS | OFlags::DIRECTORY | OFlags::NOFOLLOW, Mode::empty())?))
+pub fn folder_in(folder: impl AsFd, name: &OsStr) -> io::Result<OwnedFd> {
+    Ok(openat(folder, name, FLAGS | OFlags::DIRECTORY | OFlags::NOFOLLOW, Mode::empty())?)
 }
 
 /// Opens the regular file `name` in an open folder; it is no link.
@@ -114,6 +100,14 @@ pub fn folder_in(folder: impl AsFd, name: &OsStr) -> io::Result<File> {
 /// [`OpenError`].
 pub fn open_in(folder: impl AsFd, name: impl AsRef<Path>) -> Result<File, OpenError> {
     open_at(folder, name.as_ref(), true)
+}
+
+/// As [`open_in`], where a link is followed.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn follow_in(folder: impl AsFd, name: impl AsRef<Path>) -> Result<File, OpenError> {
+    open_at(folder, name.as_ref(), false)
 }
 
 fn open_at(folder: impl AsFd, name: &Path, itself: bool) -> Result<File, OpenError> {
@@ -139,17 +133,11 @@ fn patiently(open: impl Fn() -> rustix::io::Result<OwnedFd>) -> io::Result<Owned
     Ok(open()?)
 }
 
-/// What a copy of a file or folder gets of its permissions: to run as its owner is not among it, as a copy belongs to
-/// somebody else.
-pub fn permissions_of_copy(original: &Metadata) -> Permissions {
-    Permissions::from_mode(original.permissions().mode() & 0o777)
-}
-
 /// The bytes of a file, `most` of them at most; whatever is added meanwhile.
 ///
 /// # Errors
 /// [`OpenError`]. What is too large at first sight is not read.
-pub fn read(file: &File, most: u64) -> Result<Vec<u8>, OpenError> {
+pub fn read(file: &impl disk::File, most: u64) -> Result<Vec<u8>, OpenError> {
     let mut bytes = Vec::new();
     read_into(file, most, &mut bytes)?;
     Ok(bytes)
@@ -159,14 +147,14 @@ pub fn read(file: &File, most: u64) -> Result<Vec<u8>, OpenError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_into(file: &File, most: u64, bytes: &mut Vec<u8>) -> Result<(), OpenError> {
+pub fn read_into(file: &impl disk::File, most: u64, bytes: &mut Vec<u8>) -> Result<(), OpenError> {
     bytes.clear();
-    let size = file.metadata()?.len();
+    let size = file.stat()?.bytes;
     if size > most {
         return Err(OpenError::TooLarge { size, most });
     }
     bytes.try_reserve_exact(usize::try_from(size).unwrap_or(usize::MAX)).map_err(io::Error::other)?;
-    file.take(most.saturating_add(1)).read_to_end(bytes)?;
+    file.content()?.take(most.saturating_add(1)).read_to_end(bytes)?;
     let size = bytes.len() as u64;
     if size > most { Err(OpenError::TooLarge { size, most }) } else { Ok(()) }
 }

@@ -3,17 +3,16 @@
 //! A folder is a result if its report.json is one of planish's. What the report names in it is planish's, and goes; what
 //! commands wrote there, or people put there, is not ours, and moves on into the newer result.
 
+use crate::disk::{File, Folder, Kind, Stat};
+use crate::passing;
+use crate::regular::{self, OpenError};
 use crate::report;
-use crate::{hooks, regular, verbs};
-use rustix::fs::CWD;
+use crate::{hooks, verbs};
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::ffi::OsString;
-use std::fs;
+use std::ffi::{OsStr, OsString};
 use std::io::{self, ErrorKind};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
-use walkdir::WalkDir;
 
 /// A longer report is none of planish's: one of a million charts has half of this.
 const LONGEST: u64 = 1 << 30;
@@ -31,11 +30,18 @@ struct Known {
 }
 
 /// The names of what planish wrote to the result in `folder`; none where it is no result of planish.
-pub fn own_files(folder: &Path) -> Option<BTreeSet<OsString>> {
-    let file = regular::open_itself(&folder.join(report::FILE)).ok()?;
-    let report: Known = serde_json::from_slice(&regular::read(&file, LONGEST).ok()?).ok()?;
+///
+/// # Errors
+/// A system in trouble, which says nothing about the folder.
+pub fn own_files<F: Folder>(folder: &F) -> io::Result<Option<BTreeSet<OsString>>> {
+    let text = folder.open_file(report::FILE).and_then(|file| regular::read(&file, LONGEST));
+    let text = match text {
+        Err(OpenError::Io(error)) if passing::passes(&error) => return Err(error),
+        text => text.ok(),
+    };
+    let report: Option<Known> = text.and_then(|text| serde_json::from_slice(&text).ok());
     let beside = [report::FILE, verbs::check_mesh::FILE, hooks::FILE].map(str::to_owned);
-    Some(report.outputs.into_iter().map(|o| o.file).chain(beside).map(OsString::from).collect())
+    Ok(report.map(|r| r.outputs.into_iter().map(|o| o.file).chain(beside).map(OsString::from).collect()))
 }
 
 /// Why what is not planish's cannot be kept.
@@ -47,86 +53,130 @@ pub enum NotKept {
     Io(PathBuf, io::Error),
 }
 
-/// Gives second names in `fresh` to what lies in `older` and is not `own`; where a file system has no second names,
-/// copies. What has one already is passed over if `again`. How many files, folders and links these are.
+/// Gives second names in `fresh` to what lies in `older`, which is the folder `at`, and is not `own`; where a file system
+/// has no second names, copies. What has one already is passed over if `again`. How many files, folders and links these
+/// are.
 ///
 /// # Errors
 /// [`NotKept`]; `older` is untouched in any case.
-pub fn keep_foreign(older: &Path, own: &BTreeSet<OsString>, fresh: &Path, again: bool) -> Result<usize, NotKept> {
-    let is_foreign = |e: &walkdir::DirEntry| e.depth() != 1 || !own.contains(e.file_name());
-    let (mut kept, mut folders) = (0, Vec::new());
-    // No link is followed, not even one that has taken the place of the folder itself.
-    let all = WalkDir::new(older).follow_root_links(false).min_depth(1);
-    for entry in all.into_iter().filter_entry(is_foreign) {
-        let entry = entry.map_err(|e| NotKept::Io(older.to_owned(), e.into()))?;
-        let from = entry.path();
-        let to = fresh.join(from.strip_prefix(older).unwrap_or(from));
-        let kind = entry.file_type();
-        let made = if kind.is_dir() {
-            // For nobody else as long as it is not complete.
-            let made = fs::DirBuilder::new().mode(0o700).create(&to);
-            made.inspect(|()| folders.push((from.to_owned(), to.clone())))
-        } else if kind.is_symlink() {
-            fs::read_link(from).and_then(|target| std::os::unix::fs::symlink(target, &to))
-        } else if kind.is_file() {
-            second_name(from, &to)
-        } else {
-            return Err(NotKept::Stands(from.to_owned()));
-        };
-        match made {
-            Ok(()) => kept += 1,
-            Err(e) if e.kind() == ErrorKind::AlreadyExists && again && is_second(from, &to) => {}
-            Err(e) if e.kind() == ErrorKind::AlreadyExists => return Err(NotKept::Stands(from.to_owned())),
-            Err(e) => return Err(NotKept::Io(from.to_owned(), e)),
+pub fn keep_foreign<F: Folder>(
+    older: &F,
+    at: &Path,
+    own: &BTreeSet<OsString>,
+    fresh: &F,
+    again: bool,
+) -> Result<usize, NotKept> {
+    let mut kept = 0;
+    for name in names(older, at)? {
+        if !own.contains(&name) {
+            kept += keep(older, at, &name, fresh, again)?;
         }
-    }
-    for (from, to) in folders.iter().rev() {
-        complete(from, to).map_err(|e| NotKept::Io(from.clone(), e))?;
     }
     Ok(kept)
 }
 
-/// Whether what stands at `to` is what is kept there of `from`.
-fn is_second(from: &Path, to: &Path) -> bool {
-    let [Ok(a), Ok(b)] = [from, to].map(fs::symlink_metadata) else { return false };
-    // Copies have another number, and size and time of their original.
-    let same_file = || a.ino() == b.ino() || (a.len(), a.mtime()) == (b.len(), b.mtime());
-    a.file_type() == b.file_type() && (a.is_dir() || same_file())
+/// The names in a folder, in their order.
+fn names<F: Folder>(folder: &F, at: &Path) -> Result<Vec<OsString>, NotKept> {
+    let mut names = folder.list().map_err(|e| NotKept::Io(at.to_owned(), e))?;
+    names.sort_unstable();
+    Ok(names)
+}
+
+/// Keeps what has this name, with all that is in it.
+fn keep<F: Folder>(older: &F, at: &Path, name: &OsStr, fresh: &F, again: bool) -> Result<usize, NotKept> {
+    let path = at.join(name);
+    let failed = |error| NotKept::Io(path.clone(), error);
+    let found = older.stat_of(name).map_err(failed)?;
+    let made = match found.kind {
+        // For nobody else as long as it is not complete.
+        Kind::Folder => fresh.make_folder(name, 0o700),
+        Kind::Link => older.read_link(name).and_then(|target| fresh.make_link(&target, name)),
+        Kind::File => second_name(older, name, fresh),
+        Kind::Other => return Err(NotKept::Stands(path)),
+    };
+    let is_new = match made {
+        Ok(()) => true,
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(failed(error)),
+        Err(_) if again && is_second(older, name, &found, fresh).map_err(failed)? => false,
+        Err(_) => return Err(NotKept::Stands(path)),
+    };
+    let mut kept = usize::from(is_new);
+    if found.is_folder() {
+        let [from, to] = [older.open_folder(name), fresh.open_folder(name)];
+        let (from, to) = (from.map_err(failed)?, to.map_err(failed)?);
+        let inside = keep_foreign(&from, &path, &BTreeSet::new(), &to, again)?;
+        if is_new || inside > 0 {
+            complete(&found, &to).map_err(failed)?;
+        }
+        kept += inside;
+    }
+    Ok(kept)
+}
+
+/// Whether what has this name in `fresh` is what is kept there of the one that was `found` in `older`.
+fn is_second<F: Folder>(older: &F, name: &OsStr, found: &Stat, fresh: &F) -> io::Result<bool> {
+    let second = fresh.stat_of(name)?;
+    Ok(found.kind == second.kind
+        && match found.kind {
+            Kind::Folder => true,
+            Kind::Link => older.read_link(name)? == fresh.read_link(name)?,
+            // Copies have another number, and size and time of their original.
+            Kind::File | Kind::Other => {
+                found.identity == second.identity || (found.bytes, found.modified) == (second.bytes, second.modified)
+            }
+        })
 }
 
 /// Gives a folder the permissions of the one that it was made after, and brings it to disk.
-fn complete(from: &Path, to: &Path) -> io::Result<()> {
-    let folder = regular::folder_in(CWD, to.as_os_str())?;
-    folder.set_permissions(regular::permissions_of_copy(&fs::symlink_metadata(from)?))?;
-    folder.sync_all()
+fn complete<F: Folder>(from: &Stat, to: &F) -> io::Result<()> {
+    to.set_mode(from.mode_of_copy())?;
+    to.sync()
 }
 
-fn second_name(from: &Path, to: &Path) -> io::Result<()> {
-    match fs::hard_link(from, to) {
-        Err(e) if e.kind() != ErrorKind::AlreadyExists => {
-            let mut file = regular::open_itself(from).map_err(io::Error::other)?;
-            let metadata = file.metadata()?;
-            let mut copy = fs::File::options().write(true).create_new(true).mode(0o600).open(to)?;
-            io::copy(&mut file, &mut copy)?;
-            copy.set_modified(metadata.modified()?)?;
-            copy.set_permissions(regular::permissions_of_copy(&metadata))?;
-            copy.sync_all()
-        }
+fn second_name<F: Folder>(from: &F, name: &OsStr, to: &F) -> io::Result<()> {
+    match from.link(name, to, name) {
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => copy(from, name, to),
         linked => linked,
+    }
+}
+
+fn copy<F: Folder>(from: &F, name: &OsStr, to: &F) -> io::Result<()> {
+    let file = from.open_file(name).map_err(OpenError::into_io)?;
+    let original = file.stat()?;
+    let copy = to.make_file(name, 0o600)?;
+    io::copy(&mut file.content()?, &mut Appending(&copy))?;
+    copy.set_time(original.modified)?;
+    copy.set_mode(original.mode_of_copy())?;
+    copy.sync()
+}
+
+/// Writes to a file.
+struct Appending<'a, F>(&'a F);
+
+impl<F: File> io::Write for Appending<'_, F> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.append(bytes).map(|()| bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rustix::fs::{FileType, Mode, mknodat};
+    use crate::disk::{Disk, System};
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    use std::fs;
     use std::os::unix::fs::PermissionsExt;
 
     #[test]
     fn a_result_is_known_by_its_report_and_nothing_else() {
         let folder = tempfile::tempdir().expect("a folder");
         let write = |text: &str| fs::write(folder.path().join(report::FILE), text).expect("written");
-        assert!(own_files(folder.path()).is_none());
+        let own_files = || own_files(&System.open(folder.path()).expect("there")).expect("no trouble");
+        assert!(own_files().is_none());
         for text in [
             "",
             "{}",
@@ -134,13 +184,13 @@ mod tests {
             r#"{"schema": 1, "planish": "1", "status": "fine", "outputs": []}"#,
         ] {
             write(text);
-            assert!(own_files(folder.path()).is_none(), "{text}");
+            assert!(own_files().is_none(), "{text}");
         }
         let output = r#"{"file": "surface.vtu", "bytes": 1, "blake3": "00"}"#;
         write(&format!(
             r#"{{"schema": 9, "planish": "7.1", "status": "certified", "outputs": [{output}], "more": 1}}"#
         ));
-        let names: Vec<_> = own_files(folder.path()).expect("a result").into_iter().collect();
+        let names: Vec<_> = own_files().expect("a result").into_iter().collect();
         assert_eq!(names, ["hooks.json", "mesh.json", "report.json", "surface.vtu"]);
     }
 
@@ -156,28 +206,25 @@ mod tests {
         std::os::unix::fs::symlink("/etc", older.join("link")).expect("linked");
         fs::set_permissions(older.join("notes"), fs::Permissions::from_mode(0o2750)).expect("set");
         let own = BTreeSet::from(["ours.vtu".into()]);
-        assert_eq!(keep_foreign(&older, &own, &fresh, false).expect("kept"), 5);
+        let keep_foreign = |again| {
+            let [from, to] = [&older, &fresh].map(|path| System.open(path).expect("there"));
+            keep_foreign(&from, &older, &own, &to, again)
+        };
+        assert_eq!(keep_foreign(false).expect("kept"), 5);
         assert_eq!(fs::read_to_string(fresh.join("notes/deep/a.txt")).expect("there"), "notes/deep/a.txt");
         assert_eq!(fs::read_link(fresh.join("link")).expect("a link"), Path::new("/etc"));
         assert_eq!(fs::metadata(fresh.join("notes")).expect("there").permissions().mode() & 0o777, 0o750);
         assert!(!fresh.join("ours.vtu").exists() && older.join("mine.txt").exists());
-        assert!(matches!(keep_foreign(&older, &own, &fresh, false), Err(NotKept::Stands(_))), "they are there already");
+        assert!(matches!(keep_foreign(false), Err(NotKept::Stands(_))), "they are there already");
         fs::write(older.join("late.txt"), "late").expect("written");
-        assert_eq!(keep_foreign(&older, &own, &fresh, true).expect("kept"), 1);
+        assert_eq!(keep_foreign(true).expect("kept"), 1);
         // An editor has saved it under its name meanwhile.
         fs::remove_file(older.join("mine.txt"))
             .and_then(|()| fs::write(older.join("mine.txt"), "newer"))
             .expect("written");
-        assert!(matches!(keep_foreign(&older, &own, &fresh, true), Err(NotKept::Stands(_))), "it is not dropped");
-        let link = place.path().join("linked");
-        std::os::unix::fs::symlink(&older, &link).expect("linked");
-        assert_eq!(
-            keep_foreign(&link, &own, &place.path().join("fresh"), true).ok(),
-            Some(0),
-            "nor is a link followed"
-        );
+        assert!(matches!(keep_foreign(true), Err(NotKept::Stands(_))), "it is not dropped");
         fs::remove_file(older.join("mine.txt")).expect("removed");
         mknodat(CWD, older.join("pipe"), FileType::Fifo, Mode::RUSR, 0).expect("made");
-        assert!(matches!(keep_foreign(&older, &own, &fresh, true), Err(NotKept::Stands(_))));
+        assert!(matches!(keep_foreign(true), Err(NotKept::Stands(_))));
     }
 }

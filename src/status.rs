@@ -4,6 +4,7 @@
 //! told by its lock on `OUT/.planish/watch.lock`, which the system takes back even where the daemon was killed.
 
 use crate::conveyor::board::Running;
+use crate::disk::System;
 use crate::inbox::Notable;
 use crate::look::Identity;
 use crate::outcome::{Code, Status as Outcome};
@@ -272,7 +273,7 @@ impl Lock {
             Err(error) if !is_gone(&error) => return Held::Unknown(error),
             _ => return Held::No,
         }
-        match own::folder(&self.out.join(STAGING)).and_then(|()| lock(&self.out)) {
+        match own::folder(&System, &self.out.join(STAGING)).and_then(|_| lock(&self.out)) {
             Ok(Some(lock)) => {
                 self.lock = lock;
                 Held::Again

@@ -204,7 +204,9 @@ fn begin(shared: &Shared, job: &Job) -> Option<Suspect> {
     // The parent of a process of its own has done both.
     let begun = shared.begun.as_ref().filter(|_| job.doubted.is_none())?;
     tracing::info!("begins");
-    Some(begun.about(&job.name, job.look))
+    let staging = shared.sink.publisher()?.staging();
+    let staging = staging.inspect_err(|error| tracing::debug!("it cannot be marked as on its way: {error}")).ok()?;
+    Some(begun.about(&job.name, job.look, &staging))
 }
 
 /// A place inside the turnstile.

@@ -44,7 +44,7 @@ impl Ready {
     fn is_there(&self) -> bool {
         match &self.content {
             Made::Files(_) => true,
-            Made::Staged(staged) => staged.folder().exists(),
+            Made::Staged(staged) => staged.is_there(),
         }
     }
 }
@@ -158,7 +158,7 @@ fn try_to_put(ready: &mut Ready) -> Result<bool, PublishError> {
         Sink::Out(publisher) => publisher,
         Sink::Folder(folder) => {
             let Made::Files(files) = content else { return Ok(false) };
-            return publish::write_all(folder, files).map(|()| true);
+            return publish::write_to(folder, files).map(|()| true);
         }
     };
     match content {

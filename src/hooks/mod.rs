@@ -20,6 +20,7 @@ mod output;
 mod process;
 mod template;
 
+use crate::disk::{self, Disk, System};
 use crate::passing;
 use crate::report;
 use crate::settings::CommandSaid;
@@ -28,8 +29,7 @@ use crate::stages::read_file;
 pub use account::{Account, Outcome, Ran, SCHEMA};
 pub use orphans::end_those_of;
 use process::{Limits, Trouble};
-use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -317,16 +317,9 @@ fn told(command: &Command) -> Vec<String> {
 /// Writes the account at once: complete, or not there.
 fn write(account: &Account, target: &Target, staging: &Path) -> Result<(), HookError> {
     let text = printable_json(&serde_json::to_string_pretty(account).map_err(HookError::Account)?) + "\n";
-    let parent = tempfile::tempdir_in(staging).map_err(at(staging))?;
-    let fresh = parent.path().join(FILE);
-    let written = File::create_new(&fresh).and_then(|mut file| {
-        file.write_all(text.as_bytes())?;
-        file.sync_all()
-    });
-    written.map_err(at(&fresh))?;
-    let place = target.folder.join(FILE);
-    fs::rename(&fresh, &place).map_err(at(&place))?;
-    File::open(&target.folder).and_then(|f| f.sync_all()).map_err(at(&target.folder))
+    let desk = System.open(staging).map_err(at(staging))?;
+    let folder = System.open(&target.folder).map_err(at(&target.folder))?;
+    disk::replace_file(&desk, &folder, FILE, text.as_bytes()).map_err(at(&target.folder.join(FILE)))
 }
 
 #[cfg(test)]

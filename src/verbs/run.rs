@@ -38,7 +38,9 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     conveyor.close();
     let ends = follow(&jobs, &conveyor, &stop, settings.quiet);
     // Where it was told twice to stop.
-    hooks::end_those_of(publisher.staging());
+    if let Ok(staging) = publisher.staging() {
+        hooks::end_those_of(&staging);
+    }
     publisher.close();
     let rows: Vec<Row> = jobs.iter().map(AsRef::as_ref).zip(&ends).collect();
     if !settings.quiet {

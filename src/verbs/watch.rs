@@ -3,6 +3,7 @@
 use super::{Exit, shown};
 use crate::conveyor::Conveyor;
 use crate::daemon::Daemon;
+use crate::disk::System;
 use crate::holding;
 use crate::hooks;
 use crate::places::{self, Place};
@@ -22,19 +23,21 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
     std::fs::read_dir(inbox).map_err(|e| format!("cannot watch {}: {e}; make the folder first", shown(inbox)))?;
     places::refuse_nested(&places(inbox, out, settings))?;
     if settings.inputs != Inputs::Keep || settings.refused != Inputs::Keep {
-        holding::try_out(inbox)?;
+        holding::try_out(&System, inbox)?;
     }
     let publisher = Arc::new(Publisher::open(out)?);
     let mut lock = Lock::take(out)?;
-    holding::recover(inbox, settings.recursive);
-    destinations(settings).for_each(|(_, folder)| holding::clear(folder, settings.recursive));
+    holding::recover(&System, inbox, settings.recursive);
+    destinations(settings).for_each(|(_, folder)| holding::clear(&System, folder, settings.recursive));
     let stop = signals::listen()?;
     let conveyor = Conveyor::start(settings, publisher.clone(), true).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
     let ended = Daemon::new(inbox, settings, &conveyor, (&mut lock, &publisher)).run(&stop)?;
     // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more, and no command
     // runs on.
-    hooks::end_those_of(publisher.staging());
+    if let Ok(staging) = publisher.staging() {
+        hooks::end_those_of(&staging);
+    }
     publisher.close();
     tracing::info!(certified = ended.certified, refused = ended.refused, failed = ended.failed, "stopped");
     Ok(Exit::Success)

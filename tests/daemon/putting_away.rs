@@ -190,8 +190,30 @@ fn what_is_written_through_shared_memory_is_not_lost_with_the_input() {
     write('c');
     let after = fs::metadata(&path).expect("there");
     assert_eq!(before.modified().expect("a time"), after.modified().expect("a time"), "the test has lost its sense");
+    writer.kill().and_then(|()| writer.wait()).expect("ended");
     w.wait_until("it is put away", |_| names(inbox.path()).is_empty());
     assert!(w.is_done("a.stl", &content(b'c')), "{}", w.log());
     w.stop();
-    writer.kill().and_then(|()| writer.wait()).expect("ended");
+}
+
+/// As many systems do, Linux tells whether somebody has a file open for writing; to the owner of the file, at least.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_somebody_has_open_for_writing_stays_until_it_is_closed() {
+    let mut w = Watched::new(&["--inputs", "delete"]);
+    for name in ["open.stl", "read.stl"] {
+        w.drop_in(name, &disk(4, 0.0));
+    }
+    let writer = fs::File::options().append(true).open(w.inbox().join("open.stl")).expect("there");
+    let _reader = fs::File::open(w.inbox().join("read.stl")).expect("there");
+    w.start();
+    w.wait_until("it waits for the writer", |w| w.logged("open.stl", "somebody has it open") > 0);
+    w.wait_until("the other one is put away", |w| !w.inbox().join("read.stl").exists());
+    // It is looked at again after ten seconds.
+    std::thread::sleep(std::time::Duration::from_secs(12));
+    assert_eq!(names(&w.inbox()).into_iter().collect::<Vec<_>>(), ["open.stl"]);
+    assert_eq!(w.logged("open.stl", "somebody has it open"), 1, "{}", w.log());
+    drop(writer);
+    w.wait_until("it is put away", |w| names(&w.inbox()).is_empty());
+    w.stop();
 }

@@ -58,14 +58,14 @@ pub(in crate::conveyor) fn do_apart(
 /// Has an input done by a process of its own; none: its end is told, or its result on its way.
 fn try_apart(travel: &Arc<Travel>, hash: Hash, after: &After) -> Option<Tried> {
     let publisher = travel.shared.sink.publisher()?;
-    let staged = match publisher.room(&travel.job.name) {
+    let staged = match publisher.room() {
         Ok(staged) => staged,
         Err(error) => {
             unwritten(travel, error);
             return None;
         }
     };
-    match run(travel, staged.folder()) {
+    match run(travel, &staged.folder()) {
         Ok(Outcome::Ended(ending)) => end(travel, ending, staged, hash, after),
         Ok(Outcome::Died(death)) => return Some(of_death(travel, death)),
         Ok(Outcome::OutOfTime) => return Some(Tried::Refused(out_of_time(travel))),
