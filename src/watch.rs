@@ -15,7 +15,7 @@ use crate::look::{Identity, Look};
 use crate::shown::shown;
 use crossbeam_channel::{Receiver, Sender, after, bounded, select};
 use notify::event::{AccessKind, AccessMode, EventKind};
-use notify::{RecommendedWatcher, RecursiveMode, Watcher};
+use notify::{Config, RecommendedWatcher, RecursiveMode, Watcher};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -258,7 +258,8 @@ fn watcher(tell: Sender<()>) -> Option<RecommendedWatcher> {
         // Full: a scan is to come anyway. An error or an overflow is a reason to scan, too.
         let _ = tell.try_send(());
     };
-    let made = notify::recommended_watcher(hint);
+    // Else whoever may drop files has all folders watched to which a link of theirs leads.
+    let made = RecommendedWatcher::new(hint, Config::default().with_follow_symlinks(false));
     made.inspect_err(|error| {
         tracing::warn!("the system tells nothing of files ({error}): the inbox is scanned every second");
     })

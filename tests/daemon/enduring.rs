@@ -90,6 +90,23 @@ fn a_result_that_is_removed_is_made_again() {
     assert_eq!(w.logged("a.stl", "ends"), 2);
 }
 
+/// Somebody tidies up, and removes what they do not know.
+#[test]
+fn a_hidden_folder_that_is_removed_is_made_again() {
+    let mut w = Watched::new(&[]);
+    let bytes = disk(5, 0.0);
+    w.start();
+    w.wait_until("it tells", |w| w.status()["pid"] == w.pid());
+    fs::remove_dir_all(w.out.path().join(".planish")).expect("removed");
+    w.drop_in("a.stl", &bytes);
+    w.wait_for(&[("a.stl", &bytes)]);
+    let second = crate::support::planish(w.arguments());
+    assert!(second.code == Some(2) && second.err.contains("another planish watch"), "{}", second.err);
+    w.stop();
+    w.assert_complete("a.stl", Status::Certified);
+    w.assert_tidy(&["a.stl"]);
+}
+
 /// What was written through shared memory after it was processed shows in nothing but the content.
 #[test]
 fn what_stays_is_looked_at_once_more() {
