@@ -115,8 +115,7 @@ impl Conveyor {
         let settings = RwLock::new(Arc::new(settings.clone()));
         let (queue, board) = (Queue::default(), board::Board::default());
         let (steps, deaths) = Default::default();
-        let shared =
-            Arc::new(Shared { settings, sink, begun, is_patient, queue, grants, board, ended, steps, deaths });
+        let shared = Arc::new(Shared { settings, sink, begun, is_patient, queue, grants, board, ended, steps, deaths });
         Self { shared, ended: to_tell, threads: Vec::new() }
     }
 

@@ -86,7 +86,8 @@ fn remove(out: &Path, name: &Path) {
         Ok(true) => tracing::info!(result, "removed: its time is over, and its input has left the inbox"),
         Ok(false) => tracing::warn!(
             result,
-            "its time is over, and its input has left the inbox: what planish wrote is removed; what others put there stays"
+            "its time is over, and its input has left the inbox: what planish wrote is removed, and what others put \
+             there stays"
         ),
         Err(error) => tracing::warn!(result, "its time is over, but it cannot be removed: {error}"),
     }

@@ -84,10 +84,8 @@ impl Supervisor {
     pub fn beat(&mut self, now: Instant, seen: impl FnOnce() -> Vitals) {
         let Some(watchdog) = self.watchdog.as_mut().filter(|watchdog| now >= watchdog.next) else { return };
         watchdog.next = now + watchdog.pause;
-        let was_alive = std::mem::replace(
-            &mut watchdog.is_alive,
-            watchdog.pulse.beats(now, seen(), vitals::waits_for_disk),
-        );
+        let was_alive =
+            std::mem::replace(&mut watchdog.is_alive, watchdog.pulse.beats(now, seen(), vitals::waits_for_disk));
         if watchdog.is_alive {
             self.say(&[NotifyState::Watchdog]);
         } else if was_alive {

@@ -24,7 +24,10 @@ enum Refused {
     Unknown,
     #[error("it is certified; `planish run --force` does it again all the same")]
     Certified,
-    #[error("there are files in its result that planish did not write, and a newer result would stand behind them; move them away first")]
+    #[error(
+        "there are files in its result that planish did not write, and without its report a newer result could not take \
+         its place: move them away first"
+    )]
     Foreign,
     #[error("its result cannot be removed: {0}")]
     Io(#[from] io::Error),

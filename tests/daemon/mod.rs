@@ -7,6 +7,7 @@ mod enduring;
 mod isolating;
 mod killing;
 mod many;
+mod operating;
 mod putting_away;
 mod refusing;
 mod stopping;
