@@ -31,6 +31,8 @@ pub enum Verb {
     Info(Info),
     /// Tell what a running daemon does: queue, stages and progress, done, refused
     Status(Status),
+    /// Have inputs done again whose result is not certified
+    Retry(Retry),
     /// Process one input for another planish
     #[command(name = "job", hide = true)]
     Apart(Apart),
@@ -73,6 +75,18 @@ pub struct Watch {
     /// [default: keep]
     #[arg(long, value_name = "keep|move:DIR")]
     pub refused: Option<Refused>,
+    /// Tell in this file what the daemon does, for the textfile collector of Prometheus' node_exporter
+    #[arg(long, value_name = "FILE")]
+    pub metrics: Option<PathBuf>,
+    /// Take up no input while the disk of the results has less room than this; 0: take all up [default: 64MiB]
+    #[arg(long, value_name = "SIZE")]
+    pub min_free: Option<ByteSize>,
+    /// Remove results that are older than this, and whose input has left the inbox [default: keep them]
+    #[arg(long, value_name = "DAYS")]
+    pub keep_results: Option<f64>,
+    /// Start nothing and write nothing: tell whether settings, commands and folders are as a start needs them
+    #[arg(long)]
+    pub check_config: bool,
     /// Shared options
     #[command(flatten)]
     pub making: Making,
@@ -90,6 +104,26 @@ pub struct Status {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+    /// Tell whether an operator must act; exit code 1: yes
+    #[arg(long)]
+    pub health: bool,
+    /// With --health: an input that has waited longer than this for its result is a reason to act
+    #[arg(long, value_name = "SECONDS", requires = "health", default_value_t = 3600.0)]
+    pub max_age: f64,
+    /// Shared options
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// `planish retry`
+#[derive(Debug, Args)]
+pub struct Retry {
+    /// Names of results that are not certified, as `planish status` tells them
+    #[arg(required = true, value_name = "NAME")]
+    pub names: Vec<PathBuf>,
+    /// The output folder of the daemon
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
     /// Shared options
     #[command(flatten)]
     pub common: Common,
@@ -265,6 +299,7 @@ impl Verb {
             Self::Check(check) => (&check.common, Said::default()),
             Self::Info(info) => (&info.common, Said { weld: info.reading.weld, ..Said::default() }),
             Self::Apart(apart) => (&apart.common, Said { log: Some(Log::Json), ..Said::default() }),
+            Self::Retry(retry) => (&retry.common, Said { out: retry.out.clone(), ..Said::default() }),
             Self::Status(status) => (&status.common, Said { out: status.out.clone(), ..Said::default() }),
         };
         said.log = common.log.or(said.log);
@@ -283,6 +318,9 @@ impl Watch {
             drain: self.drain.then_some(true),
             inputs: self.inputs.clone(),
             refused: self.refused.clone(),
+            metrics: self.metrics.clone(),
+            min_free: self.min_free,
+            keep_results: self.keep_results,
             ..self.making.said()
         }
     }

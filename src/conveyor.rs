@@ -50,6 +50,7 @@ use reading::Next;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::Duration;
 use surface::{Place, Surface};
@@ -62,7 +63,7 @@ const ENDED: usize = 64;
 
 /// Results that wait for their commands, or to be put in place, at most: the former hold no memory to speak of, the latter
 /// what the budget gives them.
-const CHAINED: usize = 1024;
+pub const CHAINED: usize = 1024;
 
 /// Results that are written at once, per belt: writing waits for the disk.
 const WRITERS: usize = 4;
@@ -113,7 +114,8 @@ impl Conveyor {
         let (ended, to_tell) = bounded(ENDED);
         let settings = RwLock::new(Arc::new(settings.clone()));
         let (queue, board) = (Queue::default(), board::Board::default());
-        let shared = Arc::new(Shared { settings, sink, begun, is_patient, queue, grants, board, ended });
+        let (steps, deaths) = Default::default();
+        let shared = Arc::new(Shared { settings, sink, begun, is_patient, queue, grants, board, ended, steps, deaths });
         Self { shared, ended: to_tell, threads: Vec::new() }
     }
 
@@ -173,6 +175,27 @@ impl Conveyor {
     /// No more jobs come: those that wait are still done, then the stages end.
     pub fn close(&self) {
         self.shared.queue.close();
+    }
+
+    /// Inputs that are taken up from now on are done with these settings. How many threads there are, and where results
+    /// go, does not change.
+    pub fn set_settings(&self, settings: Arc<Settings>) {
+        *self.shared.settings.write() = settings;
+    }
+
+    /// Takes no job up, or takes them up again. After [`Self::close`] they are taken up in any case.
+    pub fn pause(&self, is_paused: bool) {
+        self.shared.queue.pause(is_paused);
+    }
+
+    /// How many steps work has taken: where it stands still, so does this number.
+    pub fn steps(&self) -> u64 {
+        self.shared.steps.load(Ordering::Relaxed)
+    }
+
+    /// How many processes have died of inputs.
+    pub fn deaths(&self) -> u64 {
+        self.shared.deaths.load(Ordering::Relaxed)
     }
 
     /// Jobs as they end: each exactly once.
@@ -321,6 +344,8 @@ fn log(report: &Report) {
 fn published(travel: Arc<Travel>, done: Done, chain: &Sender<Chained>) {
     travel.give_memory_back();
     if chain::is_asked_for(&travel.settings, done.report.status) {
+        // It may wait for the commands of others: that is no work that stands still.
+        travel.reached(Stage::Chain);
         hand_on(chain, Chained { travel, done });
     } else {
         travel.end(End::Done(done));
@@ -329,7 +354,6 @@ fn published(travel: Arc<Travel>, done: Done, chain: &Sender<Chained>) {
 
 /// Runs the commands on a result, and puts its input away.
 fn follow_up(Chained { travel, done }: Chained) {
-    travel.reached(Stage::Chain);
     let _in_stage = travel.in_stage(Stage::Chain);
     let Some(publisher) = travel.shared.sink.publisher() else { return };
     travel.end(match chain::run(&travel.job, &done.report, &travel.settings, publisher) {

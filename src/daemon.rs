@@ -1,16 +1,23 @@
 //! The daemon: what is seen in the inbox becomes jobs, what is asked from outside is done.
 
+mod reloading;
+mod telling;
+
 use crate::conveyor::{Conveyor, Ended};
 use crate::inbox::{Change, Doubt, Inbox, Rest};
 use crate::job::{Done, End, Job};
+use crate::metrics::Metrics;
 use crate::publish::Publisher;
 use crate::report;
+use crate::retention::Retention;
 use crate::settings::Settings;
 use crate::shown::shown;
-use crate::status::{self, Counts, Held, Lock, NAMED, Noted, Progress, Status, Trouble};
+use crate::status::{self, Counts, Held, Lock, Status, Trouble};
+use crate::supervisor::Supervisor;
 use crate::watch::{Event, Eyes, Stop};
 use blake3::Hash;
-use std::collections::BTreeMap;
+pub use reloading::Source;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -56,15 +63,21 @@ enum Phase {
 
 /// The daemon.
 pub struct Daemon<'a> {
-    settings: &'a Settings,
+    settings: Arc<Settings>,
+    source: Source<'a>,
     conveyor: &'a Conveyor,
     lock: &'a mut Lock,
     publisher: &'a Publisher,
     eyes: Eyes,
     inbox: Inbox,
     jobs: BTreeMap<PathBuf, Arc<Job>>,
+    /// Jobs that may have been taken up with settings that are no longer in force.
+    outdated: BTreeSet<PathBuf>,
+    retention: Retention,
     phase: Phase,
     status: Status,
+    supervisor: Supervisor,
+    metrics: Option<Metrics>,
     next_look: Instant,
     next_tell: Instant,
     /// Whether something may have changed since the status was told.
@@ -79,7 +92,7 @@ impl<'a> Daemon<'a> {
     /// A daemon that watches the folder `inbox`.
     pub fn new(
         inbox: &Path,
-        settings: &'a Settings,
+        (settings, source): (&Settings, Source<'a>),
         conveyor: &'a Conveyor,
         (lock, publisher): (&'a mut Lock, &'a Publisher),
     ) -> Self {
@@ -87,15 +100,20 @@ impl<'a> Daemon<'a> {
         let status = Status { pid, inbox: inbox.to_string_lossy().into_owned(), since, ..Status::default() };
         let now = Instant::now();
         Self {
-            settings,
+            settings: Arc::new(settings.clone()),
+            source,
             conveyor,
             lock,
             publisher,
             eyes: Eyes::new(inbox, settings.recursive, settings.poll),
             inbox: Inbox::default(),
             jobs: BTreeMap::new(),
+            outdated: BTreeSet::new(),
+            retention: Retention::new(publisher.out()),
             phase: Phase::Watching,
             status,
+            supervisor: Supervisor::new(),
+            metrics: settings.metrics.as_deref().map(Metrics::new),
             next_look: now,
             next_tell: now,
             untold: true,
@@ -109,21 +127,22 @@ impl<'a> Daemon<'a> {
     /// # Errors
     /// [`OutIsGone`]: there is no place for results any more.
     pub fn run(mut self, stop: &Stop) -> Result<Counts, OutIsGone> {
+        self.look(Instant::now());
+        self.supervisor.ready();
         loop {
             self.hold_lock()?;
             let now = Instant::now();
             if self.phase == Phase::Watching && now >= self.next_look {
                 self.look(now);
             }
-            if now >= self.next_tell && self.is_to_tell(now) {
-                self.tell(now);
-            }
+            self.tell_what_is_due(now);
             let event = self.next_event(stop);
             self.untold |= !matches!(event, Event::Tick);
             match event {
                 Event::Hint => self.next_look = self.next_look.min(self.eyes.rested()),
                 Event::Ended(ended) => self.ended(*ended),
                 Event::Stop => self.stop(),
+                Event::Reload => self.reload(),
                 Event::Tick => {}
             }
             let over = match self.phase {
@@ -132,6 +151,7 @@ impl<'a> Daemon<'a> {
                 Phase::Stopping(latest) => self.jobs.is_empty() || Instant::now() >= latest,
             };
             if over {
+                self.last_words();
                 return Ok(self.status.ended);
             }
         }
@@ -159,18 +179,13 @@ impl<'a> Daemon<'a> {
         self.status.last_error = Some(Trouble::now(message));
     }
 
-    fn is_to_tell(&self, now: Instant) -> bool {
-        self.untold || !self.jobs.is_empty() || now >= self.next_tell + ALIVE
-    }
-
     fn next_event(&self, stop: &Stop) -> Event {
         let mut wake = match self.phase {
             Phase::Watching => self.next_look,
             Phase::Draining => Instant::now() + TELL,
             Phase::Stopping(latest) => latest,
         };
-        let tell = if self.untold || !self.jobs.is_empty() { self.next_tell } else { self.next_tell + ALIVE };
-        wake = wake.min(tell);
+        wake = wake.min(self.next_words());
         self.eyes.wait(self.conveyor, stop, wake)
     }
 
@@ -179,11 +194,13 @@ impl<'a> Daemon<'a> {
         let listing = self.eyes.look();
         self.next_look = now + self.eyes.period();
         if let Some(listing) = listing {
+            self.look_for_room();
             self.untold |= self.inbox.due().is_some();
             for change in self.inbox.look(&listing, now) {
                 self.follow(change);
             }
             self.look_for_results(now);
+            self.remove_old_results(now);
             self.warn_of_overdue(now);
             self.look_when_due();
         }
@@ -205,6 +222,13 @@ impl<'a> Daemon<'a> {
                 self.inbox.forget(&name, now);
             }
         }
+    }
+
+    /// Removes some of the results whose time is over.
+    fn remove_old_results(&mut self, now: Instant) {
+        let Some(kept) = self.settings.keep_results.filter(|_| self.eyes.is_there()) else { return };
+        let jobs = &self.jobs;
+        self.retention.step(now, kept, self.eyes.inbox(), |name| jobs.contains_key(name));
     }
 
     fn warn_of_overdue(&mut self, now: Instant) {
@@ -229,6 +253,7 @@ impl<'a> Daemon<'a> {
                 self.conveyor.submit(job);
             }
             Change::Withdrawn(name) => {
+                self.outdated.remove(&name);
                 if let Some(job) = self.jobs.remove(&name) {
                     tracing::info!(input = shown(&name), "changed or removed: the job is cancelled");
                     job.cancel();
@@ -242,10 +267,14 @@ impl<'a> Daemon<'a> {
             self.status.ended.count(done.report.status);
             self.status.last_published = Some(status::now());
         }
+        self.metrics.iter_mut().for_each(Metrics::soon);
         // A withdrawn job says nothing about the file that has its name now.
         if self.jobs.get(&job.name).is_some_and(|current| Arc::ptr_eq(current, &job)) {
             self.jobs.remove(&job.name);
             self.rest(&job, end);
+            if self.outdated.remove(&job.name) {
+                self.inbox.forget(&job.name, Instant::now());
+            }
             self.look_when_due();
         }
     }
@@ -306,8 +335,11 @@ impl<'a> Daemon<'a> {
 
     /// The first time politely, then at once.
     fn stop(&mut self) {
+        self.supervisor.stopping();
         self.conveyor.close();
-        if self.settings.drain && self.phase == Phase::Watching {
+        // Where there is no room, what waits cannot be finished.
+        let may_drain = self.settings.drain && self.status.paused.is_none();
+        if may_drain && self.phase == Phase::Watching {
             tracing::info!(inputs = self.jobs.len(), "told to stop: finishes what waits; told again, it stops at once");
             self.phase = Phase::Draining;
         } else if !matches!(self.phase, Phase::Stopping(_)) {
@@ -318,29 +350,5 @@ impl<'a> Daemon<'a> {
             self.phase = Phase::Stopping(Instant::now());
         }
         self.next_tell = Instant::now();
-    }
-
-    fn tell(&mut self, now: Instant) {
-        let waiting = self.conveyor.waiting();
-        self.status.draining = self.phase != Phase::Watching;
-        self.status.waiting = waiting.len();
-        self.status.next = waiting.iter().take(NAMED).map(|job| job.name.to_string_lossy().into_owned()).collect();
-        self.status.running = self.conveyor.running().into_iter().map(Progress::from).collect();
-        self.status.unsettled = self.inbox.unsettled();
-        self.status.notables = self.inbox.notable().count();
-        self.status.notable = self.inbox.notable().take(NAMED).map(Noted::from).collect();
-        self.status.oldest = self.inbox.oldest().map(|since| status::tenths(since.elapsed()));
-        self.status.told = status::now();
-        self.status.log_lines_lost = crate::logging::lost();
-        let staging = self.publisher.staging().map_err(std::io::Error::other);
-        let told = staging.and_then(|staging| self.lock.tell(&self.status, &staging));
-        if let Err(error) = &told
-            && self.is_told
-        {
-            tracing::warn!("the status for `planish status` cannot be written: {error}");
-        }
-        self.is_told = told.is_ok();
-        self.next_tell = now + TELL;
-        self.untold = false;
     }
 }

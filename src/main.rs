@@ -23,13 +23,14 @@ fn main() -> ExitCode {
 fn dispatch(verb: &Verb, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     match verb {
         Verb::Run(run) => verbs::run::run(&run.inputs, settings),
-        Verb::Watch(watch) => verbs::watch::watch(&watch.inbox, settings),
+        Verb::Watch(watch) => verbs::watch::watch(watch, settings, &|| verb.settings()),
         Verb::Check(check) => match check.question() {
             Some(question) => verbs::check_mesh::check_mesh(&check.results, &question, settings),
             None => Ok(verbs::check::check(&check.results, settings.quiet)),
         },
         Verb::Info(info) => verbs::info::info(&info.inputs, info.json, settings),
         Verb::Apart(apart) => verbs::job::job(apart, settings),
-        Verb::Status(status) => verbs::status::status(status.json, settings),
+        Verb::Status(status) => verbs::status::status(status, settings),
+        Verb::Retry(retry) => verbs::retry::retry(&retry.names, settings),
     }
 }

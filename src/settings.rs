@@ -9,6 +9,7 @@ use bytesize::ByteSize;
 use pipeline::Order;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 pub use values::{CommandSaid, FeatureAngle, HandOff, Inputs, LimitsSaid, Log, Off, Refused};
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
@@ -63,6 +64,14 @@ pub struct Said {
     pub inputs: Option<Inputs>,
     /// What becomes of inputs that are refused or failed.
     pub refused: Option<Refused>,
+    /// The file that tells Prometheus what the daemon does.
+    pub metrics: Option<PathBuf>,
+    /// Where the disk of the results has less room than this, no input is taken up; 0: whatever it has.
+    #[serde(rename = "min-free")]
+    pub min_free: Option<ByteSize>,
+    /// Days for which results are kept whose input has left the inbox.
+    #[serde(rename = "keep-results")]
+    pub keep_results: Option<f64>,
     /// What is too much for one input.
     pub limits: Option<LimitsSaid>,
     /// Form of log messages.
@@ -122,6 +131,12 @@ pub struct Settings {
     pub inputs: Inputs,
     /// What becomes of inputs that are refused or failed; they are never deleted.
     pub refused: Inputs,
+    /// The file that tells Prometheus what the daemon does; none: nothing does.
+    pub metrics: Option<PathBuf>,
+    /// Where the disk of the results has less room than this, in bytes, no input is taken up.
+    pub min_free: u64,
+    /// For how long results are kept whose input has left the inbox; none: for ever.
+    pub keep_results: Option<Duration>,
     /// What is too much for one input.
     pub limits: Limits,
     /// Form of log messages.
@@ -184,6 +199,9 @@ pub enum SettingsError {
     /// No time.
     #[error("job-time is {0}; it must be a positive number of seconds")]
     JobTime(f64),
+    /// Results would go before anybody sees them, or never.
+    #[error("keep-results is {0}; it must be a positive number of days, at most {MOST_DAYS}")]
+    KeepResults(f64),
     /// A command cannot run.
     #[error("[[{occasion}]], table {table}: {error}")]
     Command {
@@ -226,6 +244,12 @@ const LEAST_MEMORY: ByteSize = ByteSize::mib(16);
 
 /// The stacks and buffers of an idle process take half of this.
 const LEAST_JOB_MEMORY: ByteSize = ByteSize::mib(64);
+
+/// Room that is left on the disk of the results, where nothing is said: enough to tell what is wrong.
+const USUAL_MIN_FREE: ByteSize = ByteSize::mib(64);
+
+/// A century: more is a slip of the finger.
+const MOST_DAYS: f64 = 36_500.0;
 
 /// The processors that this process may use.
 fn processors() -> usize {
@@ -275,6 +299,9 @@ impl Said {
             drain: self.drain.or(other.drain),
             inputs: self.inputs.or(other.inputs),
             refused: self.refused.or(other.refused),
+            metrics: self.metrics.or(other.metrics),
+            min_free: self.min_free.or(other.min_free),
+            keep_results: self.keep_results.or(other.keep_results),
             limits: self.limits.or(other.limits),
             log: self.log.or(other.log),
             verbose: self.verbose.or(other.verbose),
@@ -336,6 +363,7 @@ impl Said {
         if let Some(seconds) = self.job_time.filter(|s| !(*s > 0.0 && s.is_finite())) {
             return Err(SettingsError::JobTime(seconds));
         }
+        let keep_results = self.keep_results.map(kept_for).transpose()?;
         Ok(Settings {
             out: self.out,
             order,
@@ -358,6 +386,9 @@ impl Said {
             drain: self.drain.unwrap_or(false),
             inputs: self.inputs.unwrap_or_default(),
             refused: self.refused.unwrap_or_default().0,
+            metrics: self.metrics,
+            min_free: self.min_free.unwrap_or(USUAL_MIN_FREE).as_u64(),
+            keep_results,
             limits: self.limits.unwrap_or_default().or_default(),
             log: self.log.unwrap_or_default(),
             verbose: self.verbose.unwrap_or(0),
@@ -365,6 +396,14 @@ impl Said {
             on_certified: hooks(self.on_certified, Occasion::Certified)?,
             on_refused: hooks(self.on_refused, Occasion::Refused)?,
         })
+    }
+}
+
+fn kept_for(days: f64) -> Result<Duration, SettingsError> {
+    if days > 0.0 && days <= MOST_DAYS {
+        Ok(Duration::from_secs_f64(days * 86_400.0))
+    } else {
+        Err(SettingsError::KeepResults(days))
     }
 }
 
@@ -400,6 +439,10 @@ mod tests {
         for angle in [0.0, 180.0, f64::NAN] {
             let said = Said { feature_angle: Some(FeatureAngle::Degrees(angle)), ..Said::default() };
             assert!(matches!(said.check(), Err(SettingsError::FeatureAngle(_))));
+        }
+        for days in [0.0, -1.0, 1e9, f64::NAN] {
+            let said = Said { keep_results: Some(days), ..Said::default() };
+            assert!(matches!(said.check(), Err(SettingsError::KeepResults(_))));
         }
         for ratio in [9.0, f64::NAN, f64::INFINITY] {
             let said = Said { max_area_ratio: Some(ratio), ..Said::default() };

@@ -4,12 +4,21 @@ use crate::watch::Stop;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-/// From now on Ctrl-C, SIGTERM and SIGHUP ask to stop instead of ending the program. But one that was ignored when the
+/// What SIGHUP asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hangup {
+    /// To stop: the terminal is gone.
+    Stop,
+    /// To read the settings again, as services do.
+    Reload,
+}
+
+/// From now on Ctrl-C and SIGTERM, and perhaps SIGHUP, ask to stop instead of ending the program. But one that was ignored when the
 /// program was started stays ignored: `nohup` is there for that, and a shell has its background jobs ignore Ctrl-C.
 ///
 /// # Errors
 /// Where the system does not allow it.
-pub fn listen() -> std::io::Result<Stop> {
+pub fn listen(hangup: Hangup) -> std::io::Result<Stop> {
     let stop = Stop::default();
     let asked = stop.clone();
     let ignored = ignored();
@@ -17,7 +26,9 @@ pub fn listen() -> std::io::Result<Stop> {
     let mut signals = Signals::new(heard)?;
     std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
         // Ends with the program.
-        signals.forever().for_each(|_| asked.ask());
+        for signal in signals.forever() {
+            if (signal, hangup) == (SIGHUP, Hangup::Reload) { asked.ask_to_reload() } else { asked.ask() }
+        }
     })?;
     Ok(stop)
 }

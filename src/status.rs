@@ -13,6 +13,7 @@ use crate::publish::STAGING;
 use crate::regular::{self, OpenError};
 use crate::shown::shown;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -58,6 +59,9 @@ pub struct Status {
     /// How many these are.
     #[serde(default)]
     pub notables: usize,
+    /// How many are in which state.
+    #[serde(default)]
+    pub notable_states: BTreeMap<String, usize>,
     /// For how long the input has waited that has waited the longest for its result, in seconds; null: none waits.
     #[serde(default)]
     pub oldest: Option<f64>,
@@ -75,6 +79,33 @@ pub struct Status {
     /// Log messages that were lost, because nobody took them off standard error.
     #[serde(default)]
     pub log_lines_lost: usize,
+    /// When the last one was lost: seconds since 1970; null: none was.
+    #[serde(default)]
+    pub last_lost: Option<u64>,
+    /// Room on the disk of the results, in bytes; null: the system does not tell.
+    #[serde(default)]
+    pub bytes_free: Option<u64>,
+    /// The room that there should be, in bytes, so that inputs are taken up.
+    #[serde(default)]
+    pub min_free: Option<u64>,
+    /// Why no input is taken up at the moment; null: inputs are.
+    #[serde(default)]
+    pub paused: Option<String>,
+}
+
+impl Status {
+    /// What the daemon does, on one line.
+    pub fn line(&self) -> String {
+        let doing = if self.draining { "stops when all is done: " } else { "" };
+        let mut line = format!("{doing}{} run, {} wait", self.running.len(), self.waiting);
+        if let Some(paused) = &self.paused {
+            line += &format!("; {paused}");
+        }
+        if let Some(error) = &self.last_error {
+            line += &format!("; last error: {}", error.message);
+        }
+        shown(line.as_ref())
+    }
 }
 
 /// An input on its way.

@@ -40,21 +40,27 @@ pub enum Event {
     Ended(Box<Ended>),
     /// The daemon is asked to stop.
     Stop,
+    /// The daemon is asked to read its settings again.
+    Reload,
     /// It is time.
     Tick,
 }
 
-/// Asks the daemon to stop: once politely, twice at once.
+/// Asks the daemon to stop: once politely, twice at once. Or to read its settings again.
 #[derive(Clone, Debug)]
 pub struct Stop {
     asked: Sender<()>,
     heard: Receiver<()>,
+    reload: Sender<()>,
+    to_reload: Receiver<()>,
 }
 
 impl Default for Stop {
     fn default() -> Self {
         let (asked, heard) = bounded(8);
-        Self { asked, heard }
+        // However often it is asked meanwhile, the settings are read once.
+        let (reload, to_reload) = bounded(1);
+        Self { asked, heard, reload, to_reload }
     }
 }
 
@@ -63,6 +69,12 @@ impl Stop {
     pub fn ask(&self) {
         // Full: it was asked often enough.
         let _ = self.asked.try_send(());
+    }
+
+    /// Asks to read the settings again.
+    pub fn ask_to_reload(&self) {
+        // Full: that is to come anyway.
+        let _ = self.reload.try_send(());
     }
 
     /// Whether it was asked since the last call.
@@ -126,6 +138,11 @@ impl Eyes {
         if self.watcher.is_some() && self.watched.is_some() { SCAN } else { POLL }
     }
 
+    /// Whether the folder was there at the last look.
+    pub fn is_there(&self) -> bool {
+        !self.is_missing
+    }
+
     /// The earliest moment for the next look.
     pub fn rested(&self) -> Instant {
         self.rested
@@ -137,6 +154,7 @@ impl Eyes {
             recv(self.hints) -> _ => Event::Hint,
             recv(conveyor.ended()) -> ended => ended.map_or(Event::Tick, |e| Event::Ended(Box::new(e))),
             recv(stop.heard) -> _ => Event::Stop,
+            recv(stop.to_reload) -> _ => Event::Reload,
             recv(after(wake.saturating_duration_since(Instant::now()))) -> _ => Event::Tick,
         }
     }

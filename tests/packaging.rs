@@ -49,6 +49,8 @@ fn the_example_works_as_it_is_and_switched_on_and_shows_the_defaults() {
         memory: all.memory,
         job_memory: all.job_memory,
         job_time: all.job_time,
+        metrics: all.metrics.clone(),
+        keep_results: all.keep_results,
         on_certified: all.on_certified.clone(),
         on_refused: all.on_refused.clone(),
         ..as_it_is
@@ -67,6 +69,8 @@ fn systemd_has_nothing_against_the_unit() {
         eprintln!("skipped: no systemd-analyze (apt-get install systemd)");
         return;
     }
+    // Older ones know no steps between restarts, and stay with the first.
+    let is_known = |line: &&str| !["'RestartSteps'", "'RestartMaxDelaySec'"].iter().any(|key| line.contains(key));
     let verify = |unit: &str| {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("planish.service");
@@ -74,7 +78,7 @@ fn systemd_has_nothing_against_the_unit() {
         let mut command = Command::new("systemd-analyze");
         let output = command.args(["verify", "--man=no", "--recursive-errors=no"]).arg(path).output().expect("runs");
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
-        let about_it: Vec<&str> = told.lines().filter(|l| l.contains("planish")).collect();
+        let about_it: Vec<&str> = told.lines().filter(|l| l.contains("planish")).filter(is_known).collect();
         (output.status.success(), about_it.join("\n"))
     };
     // The program must be there: the one of this build is.
@@ -83,4 +87,28 @@ fn systemd_has_nothing_against_the_unit() {
     assert_eq!(verify(&unit), (true, String::new()));
     let (good, told) = verify(&unit.replace("KillMode=mixed", "KillMode=mixd"));
     assert!(!good || told.contains("KillMode"), "a broken twin is found: {told}");
+}
+
+/// 0 is a service that can do nothing, 10 one that can do all.
+#[test]
+fn the_unit_lets_the_service_do_little() {
+    if Command::new("systemd-analyze").arg("--version").output().is_err() {
+        eprintln!("skipped: no systemd-analyze (apt-get install systemd)");
+        return;
+    }
+    // Whether the exposure is 1.0 at the most.
+    let is_little = |unit: &str| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("planish.service");
+        std::fs::write(&path, unit).expect("written");
+        let mut command = Command::new("systemd-analyze");
+        command.args(["security", "--offline=true", "--no-pager", "--threshold=10"]).arg(path);
+        let output = command.output().expect("runs");
+        let told = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(told.contains("Overall exposure level"), "{told}{}", String::from_utf8_lossy(&output.stderr));
+        output.status.success()
+    };
+    let unit = packaged("planish.service");
+    assert!(is_little(&unit));
+    assert!(!is_little(&unit.replace("PrivateNetwork=yes", "PrivateNetwork=no").replace("CapabilityBoundingSet=", "")));
 }

@@ -44,6 +44,7 @@ struct State {
     arrivals: u64,
     ended: u64,
     closed: bool,
+    paused: bool,
 }
 
 /// The belt for an input of `bytes`.
@@ -71,7 +72,8 @@ impl Queue {
     pub fn pop(&self, belt: usize) -> Option<Waiting> {
         let mut state = self.state.lock();
         loop {
-            if let Some((_, waiting)) = state.belts[belt].pop_first() {
+            let may_go = !state.paused || state.closed;
+            if may_go && let Some((_, waiting)) = state.belts[belt].pop_first() {
                 return Some(waiting);
             }
             if state.closed {
@@ -85,6 +87,12 @@ impl Queue {
     pub fn ended(&self, job: &Job) {
         let mut state = self.state.lock();
         state.ended = state.ended.saturating_add(cost(job));
+    }
+
+    /// No job goes on, or all do again. Once it is closed, they go on in any case.
+    pub fn pause(&self, is_paused: bool) {
+        self.state.lock().paused = is_paused;
+        self.changed.notify_all();
     }
 
     /// No more jobs will come: those that wait are still served.
@@ -145,6 +153,24 @@ mod tests {
         }
         queue.push(job("small", 1));
         assert_eq!(names(&queue), ["small"]);
+    }
+
+    #[test]
+    fn none_goes_on_in_a_pause_and_none_waits_behind_the_end() {
+        let queue = Queue::default();
+        queue.pause(true);
+        queue.push(job("a", 1));
+        std::thread::scope(|scope| {
+            let served = scope.spawn(|| queue.pop(0));
+            std::thread::sleep(std::time::Duration::from_millis(50));
+            assert_eq!((names(&queue).len(), served.is_finished()), (1, false));
+            queue.pause(false);
+            assert!(served.join().expect("ends").is_some());
+        });
+        queue.pause(true);
+        queue.push(job("b", 1));
+        queue.close();
+        assert!(queue.pop(0).is_some() && queue.pop(0).is_none());
     }
 
     #[test]

@@ -34,12 +34,21 @@ pub(super) struct Shared {
     pub grants: Arc<dyn Grants>,
     pub board: Board,
     pub ended: Sender<Ended>,
+    /// Steps that work has taken: a sign of life.
+    pub steps: AtomicU64,
+    /// Processes that died of inputs.
+    pub deaths: AtomicU64,
 }
 
 impl Shared {
     /// The settings as they are now.
     pub fn settings(&self) -> Arc<Settings> {
         self.settings.read().clone()
+    }
+
+    /// Work has taken a step.
+    pub fn step(&self) {
+        self.steps.fetch_add(1, Ordering::Relaxed);
     }
 }
 
@@ -120,6 +129,7 @@ impl Travel {
 
     /// One more process has died of it; how many that are.
     pub fn count_death(&self) -> u32 {
+        self.shared.deaths.fetch_add(1, Ordering::Relaxed);
         let mut suspect = self.suspect.lock();
         // Only a process of its own has none, and that starts no other.
         let Some(suspect) = suspect.as_mut() else { return u32::MAX };
@@ -155,6 +165,7 @@ impl Travel {
 
     /// Tells that the job has come so far.
     pub fn reached(&self, stage: Stage) {
+        self.shared.step();
         self.shared.board.update(self.number, |job| job.stage = job.stage.max(stage));
     }
 
@@ -192,6 +203,7 @@ impl Drop for Travel {
     fn drop(&mut self) {
         self.give_memory_back();
         self.shared.board.remove(self.number);
+        self.shared.step();
         self.shared.queue.ended(&self.job);
         let end = self.end.get_mut().take().unwrap_or(End::Lost);
         // Fails only where nobody asks any more.
@@ -228,6 +240,7 @@ impl Drop for Seat<'_> {
 impl Host for Seat<'_> {
     fn go_on(&self) -> bool {
         let Travel { shared, turn, job, .. } = self.0;
+        shared.step();
         if job.is_wanted() {
             shared.grants.let_pass(*turn);
         }
@@ -279,6 +292,8 @@ pub(super) mod tests {
             grants: Arc::new(Own::new(1, memory)),
             board: Board::default(),
             ended,
+            steps: AtomicU64::new(0),
+            deaths: AtomicU64::new(0),
         };
         (Arc::new(shared), to_tell, out)
     }

@@ -1,9 +1,11 @@
 //! The verbs of the command line.
 
 pub mod check;
+pub mod check_config;
 pub mod check_mesh;
 pub mod info;
 pub mod job;
+pub mod retry;
 pub mod run;
 pub mod status;
 pub mod watch;

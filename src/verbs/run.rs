@@ -9,7 +9,7 @@ use crate::outcome::Status;
 use crate::publish::Publisher;
 use crate::report::Report;
 use crate::settings::Settings;
-use crate::signals;
+use crate::signals::{self, Hangup};
 use crate::watch::Stop;
 use comfy_table::{CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -31,7 +31,7 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     inputs::refuse_same_names(&jobs)?;
     inputs::refuse_inside(&jobs, out)?;
     let publisher = Arc::new(Publisher::open(out)?);
-    let stop = signals::listen()?;
+    let stop = signals::listen(Hangup::Stop)?;
     let conveyor = Conveyor::start(settings, publisher.clone(), false).map_err(|e| super::no_threads(&e))?;
     let jobs: Vec<Arc<Job>> = jobs.into_iter().map(Arc::new).collect();
     jobs.iter().for_each(|job| conveyor.submit(job.clone()));

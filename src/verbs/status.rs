@@ -1,6 +1,8 @@
 //! `planish status`: what a running daemon does.
 
 use super::{Exit, say, say_json, shown};
+use crate::cli;
+use crate::health::{self, Health};
 use crate::ledger;
 use crate::outcome::Status as Outcome;
 use crate::settings::Settings;
@@ -22,25 +24,31 @@ struct Answer {
     results: Counts,
     /// Those that are not certified.
     refusals: Vec<Refusal>,
+    /// Whether an operator must act.
+    health: Health,
 }
 
 /// Tells what the daemon does that writes to the output folder, and what results there are.
 ///
 /// # Errors
 /// Wrong usage.
-pub fn status(json: bool, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
+pub fn status(asked: &cli::Status, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
     std::fs::read_dir(out).map_err(|e| format!("cannot read the output folder {}: {e}", shown(out)))?;
-    let answer = answer(out);
-    if json {
-        say_json(&answer)?
+    let (running, daemon) = (status::is_running(out), status::told(out));
+    let health = health::now(out, running, daemon.as_ref(), asked.max_age, settings.min_free);
+    let is_good = if asked.health { health.healthy } else { running };
+    if asked.json {
+        say_json(&answer(out, running, daemon, health))?;
+    } else if asked.health {
+        health.facts.iter().for_each(|fact| say(&fact.to_string()));
     } else {
-        say(&text(&answer))
+        say(&text(&answer(out, running, daemon, health)));
     }
-    Ok(if answer.running { Exit::Success } else { Exit::Refused })
+    Ok(if is_good { Exit::Success } else { Exit::Refused })
 }
 
-fn answer(out: &Path) -> Answer {
+fn answer(out: &Path, running: bool, daemon: Option<Status>, health: Health) -> Answer {
     let mut results = Counts::default();
     let mut refusals = Vec::new();
     for (name, entry) in ledger::entries(out) {
@@ -50,7 +58,7 @@ fn answer(out: &Path) -> Answer {
             refusals.push(Refusal { name: name.to_string_lossy().into_owned(), status: entry.status, code, message });
         }
     }
-    Answer { running: status::is_running(out), daemon: status::told(out), results, refusals }
+    Answer { running, daemon, results, refusals, health }
 }
 
 /// The answer for people.
@@ -63,6 +71,7 @@ fn text(answer: &Answer) -> String {
             daemon.running.len(),
             daemon.unsettled
         ));
+        lines.extend(daemon.paused.as_ref().map(|paused| format!("  {:12} {}", "paused", plain(paused))));
         lines.extend(daemon.running.iter().map(progress));
         lines.extend(daemon.next.iter().take(NAMED).map(|name| format!("  {:12} {}", "waits", plain(name))));
         lines.extend((daemon.waiting > NAMED).then(|| format!("  and {} more", daemon.waiting - NAMED)));

@@ -1,38 +1,50 @@
 //! `planish watch`: the daemon.
 
-use super::{Exit, shown};
+use super::{Exit, check_config, shown};
+use crate::cli;
 use crate::conveyor::Conveyor;
-use crate::daemon::Daemon;
+use crate::daemon::{Daemon, Source};
 use crate::disk::System;
 use crate::holding;
 use crate::hooks;
-use crate::places::{self, Place};
+use crate::places::{self, Place, PlaceError};
 use crate::publish::Publisher;
-use crate::settings::{Inputs, Settings};
-use crate::signals;
+use crate::settings::{Inputs, Settings, SettingsError};
+use crate::signals::{self, Hangup};
 use crate::status::Lock;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Watches the folder `inbox` until it is told to stop.
+/// Watches a folder until it is told to stop. The settings, which `read` finds again, may change meanwhile, if they are
+/// in a file.
 ///
 /// # Errors
 /// What makes the call as a whole impossible: wrong usage, a second daemon.
-pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
+pub fn watch(
+    asked: &cli::Watch,
+    settings: &Settings,
+    read: &dyn Fn() -> Result<Settings, SettingsError>,
+) -> Result<Exit, Box<dyn std::error::Error>> {
+    let inbox = &asked.inbox;
     let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
-    std::fs::read_dir(inbox).map_err(|e| format!("cannot watch {}: {e}; make the folder first", shown(inbox)))?;
-    places::refuse_nested(&places(inbox, out, settings))?;
-    if settings.inputs != Inputs::Keep || settings.refused != Inputs::Keep {
+    if asked.check_config {
+        return Ok(check_config::check_config(inbox, out, settings));
+    }
+    std::fs::read_dir(inbox).map_err(|e| no_inbox(inbox, &e))?;
+    refuse_nested(inbox, out, settings)?;
+    refuse_metrics(settings)?;
+    if takes_inputs_out(settings) {
         holding::try_out(&System, inbox)?;
     }
     let publisher = Arc::new(Publisher::open(out)?);
     let mut lock = Lock::take(out)?;
     holding::recover(&System, inbox, settings.recursive);
     destinations(settings).for_each(|(_, folder)| holding::clear(&System, folder, settings.recursive));
-    let stop = signals::listen()?;
+    let stop = signals::listen(if asked.common.config.is_some() { Hangup::Reload } else { Hangup::Stop })?;
     let conveyor = Conveyor::start(settings, publisher.clone(), true).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
-    let ended = Daemon::new(inbox, settings, &conveyor, (&mut lock, &publisher)).run(&stop)?;
+    let source = Source { read, is_possible: &|settings| can_go(inbox, out, settings) };
+    let ended = Daemon::new(inbox, (settings, source), &conveyor, (&mut lock, &publisher)).run(&stop)?;
     // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more, and no command
     // runs on.
     if let Ok(staging) = publisher.staging() {
@@ -43,15 +55,45 @@ pub fn watch(inbox: &Path, settings: &Settings) -> Result<Exit, Box<dyn std::err
     Ok(Exit::Success)
 }
 
-/// The folders that must not lie in each other.
-fn places<'a>(inbox: &'a Path, out: &'a Path, settings: &'a Settings) -> Vec<Place<'a>> {
-    let mut all = vec![Place::new("inbox", inbox), Place::new("output folder", out)];
+/// What is said of an inbox that cannot be read.
+pub(super) fn no_inbox(inbox: &Path, error: &std::io::Error) -> String {
+    format!("cannot watch {}: {error}; make the folder first", shown(inbox))
+}
+
+/// Refuses folders of which one lies in another, and a file of metrics in the inbox.
+pub(super) fn refuse_nested(inbox: &Path, out: &Path, settings: &Settings) -> Result<(), PlaceError> {
+    let watched = Place::new("inbox", inbox);
+    let mut all = vec![watched, Place::new("output folder", out)];
     all.extend(destinations(settings).map(|(role, folder)| Place::new(role, folder)));
-    all
+    places::refuse_nested(&all)?;
+    let metrics = settings.metrics.iter().map(|file| Place::new("file of metrics", file));
+    places::refuse_nested(&[watched].into_iter().chain(metrics).collect::<Vec<_>>())
+}
+
+/// Refuses a file of metrics for which there is no folder.
+pub(super) fn refuse_metrics(settings: &Settings) -> Result<(), String> {
+    let Some(file) = &settings.metrics else { return Ok(()) };
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if folder.is_dir() && !file.is_dir() {
+        return Ok(());
+    }
+    Err(format!("the metrics cannot be written to {}: it must be a file in a folder that is there", shown(file)))
+}
+
+/// Whether inputs leave the inbox.
+pub(super) fn takes_inputs_out(settings: &Settings) -> bool {
+    settings.inputs != Inputs::Keep || settings.refused != Inputs::Keep
+}
+
+/// Whether inputs can go where settings say that were read while the daemon runs: to folders that are there.
+fn can_go(inbox: &Path, out: &Path, settings: &Settings) -> bool {
+    let are_there = destinations(settings).all(|(_, folder)| folder.is_dir());
+    let can_leave = || !takes_inputs_out(settings) || holding::try_out(&System, inbox).is_ok();
+    are_there && refuse_nested(inbox, out, settings).is_ok() && can_leave()
 }
 
 /// The folders to which inputs are moved, with what they are for.
-fn destinations(settings: &Settings) -> impl Iterator<Item = (&'static str, &Path)> {
+pub(super) fn destinations(settings: &Settings) -> impl Iterator<Item = (&'static str, &Path)> {
     let all = [("folder for inputs", &settings.inputs), ("folder for refused inputs", &settings.refused)];
     all.into_iter().filter_map(|(role, inputs)| match inputs {
         Inputs::Move(folder) => Some((role, folder.as_path())),

@@ -10,7 +10,7 @@ use std::process::Command;
 use std::time::Instant;
 
 /// The processes that another one has started: of planish, one for each large input.
-fn children(of: u32) -> Vec<i32> {
+pub fn children(of: u32) -> Vec<i32> {
     let tasks = fs::read_dir(format!("/proc/{of}/task")).into_iter().flatten().flatten();
     let read = |task: fs::DirEntry| fs::read_to_string(task.path().join("children")).unwrap_or_default();
     tasks
@@ -20,7 +20,7 @@ fn children(of: u32) -> Vec<i32> {
 }
 
 /// Kills the process of the large input.
-fn kill_child(w: &Watched, not: Option<i32>) -> i32 {
+pub fn kill_child(w: &Watched, not: Option<i32>) -> i32 {
     let since = Instant::now();
     loop {
         if let Some(child) = children(w.pid()).into_iter().find(|child| Some(*child) != not) {

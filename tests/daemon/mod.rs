@@ -7,6 +7,7 @@ mod enduring;
 mod isolating;
 pub mod killing;
 pub mod many;
+mod operating;
 mod putting_away;
 mod reaching_out;
 mod refusing;

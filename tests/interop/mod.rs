@@ -58,6 +58,11 @@ pub fn tools() -> OsString {
     std::env::join_paths(folders).expect("no folder has a colon in its name")
 }
 
+/// The samples of a file of metrics, a line each, as Prometheus' own client for Python reads them.
+pub fn samples(metrics: &Path) -> String {
+    run(script("verify_metrics.py").arg(metrics), "Prometheus does not read the metrics")
+}
+
 /// VTK opens both files of a result without a word, finds every field, and every triangle is valid.
 pub fn assert_vtk_agrees(folders: &[PathBuf]) {
     let printed = run(script("verify_vtu.py").args(folders), "VTK or the independent proof disagrees");

@@ -349,6 +349,7 @@ impl<'a> Line<'a> {
     }
 
     fn take_in(&self, said: Said, channels: &Channels) {
+        self.travel.shared.step();
         match said {
             Said::Want => drop(channels.wants.send(())),
             Said::Leave => drop(channels.leaves.send(())),

@@ -1,0 +1,93 @@
+//! What the system tells of the work of this process and its children: their processor time, and whether they wait for a
+//! disk. Where it does not tell (there is no `/proc`), there is none of either.
+
+use rustix::time::{ClockId, clock_gettime};
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+/// Where the times of a process stand in its `stat`, counted behind its name: its own in user and system mode, and those
+/// of its children that have ended.
+const TIMES: std::ops::Range<usize> = 11..15;
+
+/// Where its state stands.
+const STATE: usize = 0;
+
+/// The processor time of this process and its children since the start, also of those that have ended.
+pub fn processor() -> Duration {
+    let children = children().into_iter().map(|id| format!("/proc/{id}"));
+    let ticks: u64 = children.chain(["/proc/self".to_owned()]).filter_map(|folder| ticks(folder.as_ref())).sum();
+    Duration::from_secs_f64(ticks as f64 / rustix::param::clock_ticks_per_second().max(1) as f64)
+}
+
+/// The processor time of the thread that asks.
+pub fn processor_of_this_thread() -> Duration {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    Duration::new(time.tv_sec.try_into().unwrap_or(0), time.tv_nsec.try_into().unwrap_or(0))
+}
+
+/// Whether a thread of this process or of its children sleeps and cannot be woken, as those do that wait for a disk or
+/// for a file server.
+pub fn waits_for_disk() -> bool {
+    let children = children().into_iter().map(|id| format!("/proc/{id}/task"));
+    children.chain(["/proc/self/task".to_owned()]).any(|tasks| {
+        let tasks = fs::read_dir(tasks).into_iter().flatten().flatten();
+        tasks.filter_map(|task| fields(&task.path())).any(|fields| fields.get(STATE).is_some_and(|state| state == "D"))
+    })
+}
+
+/// The numbers of the processes that this one has started.
+fn children() -> Vec<u32> {
+    let tasks = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
+    let listed = tasks.filter_map(|task| fs::read_to_string(task.path().join("children")).ok());
+    let numbers = |list: String| list.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>();
+    listed.flat_map(numbers).collect()
+}
+
+fn ticks(process: &Path) -> Option<u64> {
+    fields(process)?.get(TIMES)?.iter().map(|ticks| ticks.parse::<u64>().ok()).sum()
+}
+
+/// What the system tells of a process or thread, behind its name, in which there may be anything.
+fn fields(of: &Path) -> Option<Vec<String>> {
+    let stat = fs::read(of.join("stat")).ok()?;
+    let stat = String::from_utf8_lossy(&stat);
+    let (_, fields) = stat.rsplit_once(')')?;
+    Some(fields.split_whitespace().map(str::to_owned).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::process::{Command, Stdio};
+    use std::time::Instant;
+
+    /// Computes until the processor time has grown.
+    fn grows(work: impl Fn()) -> bool {
+        let (before, since) = (processor(), Instant::now());
+        while processor() <= before {
+            work();
+            if since.elapsed() > Duration::from_secs(60) {
+                return false;
+            }
+        }
+        true
+    }
+
+    #[test]
+    fn processor_time_is_that_of_this_process_and_of_its_children_that_run() {
+        let own = processor_of_this_thread();
+        assert!(grows(|| assert!((0..100_000_u64).map(std::hint::black_box).sum::<u64>() > 0)));
+        assert!(processor_of_this_thread() > own);
+        let mut child = Command::new("sh").args(["-c", "while :; do :; done"]).stdin(Stdio::null()).spawn();
+        let child = child.as_mut().expect("a shell");
+        let pid = child.id();
+        assert!(children().contains(&pid));
+        let (before, since) = (ticks(format!("/proc/{pid}").as_ref()), Instant::now());
+        while ticks(format!("/proc/{pid}").as_ref()) <= before && since.elapsed() < Duration::from_secs(60) {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert!(ticks(format!("/proc/{pid}").as_ref()) > before);
+        child.kill().and_then(|()| child.wait()).expect("ended");
+    }
+}
