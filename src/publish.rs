@@ -266,7 +266,7 @@ impl<D: Disk> Publisher<D> {
         let last = name.file_name().unwrap_or_default();
         match folder.open_folder(last) {
             Ok(older) => {
-                staging::keep_foreign(&older, &target, &own, &half, false)?;
+                desk.keep_foreign(&older, &target, &own, &half, false)?;
                 // It comes to lie on the desk, which must be found there.
                 run.folder.sync().map_err(at(&run.path))?;
             }

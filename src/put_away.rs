@@ -11,7 +11,6 @@
 use crate::disk::{self, Disk, File, Folder, Stat};
 use crate::holding::{HOLDING, Holding};
 use crate::look::Look;
-use crate::passing;
 use crate::regular::OpenError;
 use crate::shown::shown;
 use blake3::{Hash, Hasher};
@@ -322,7 +321,11 @@ fn fill<F: File>(input: &Processed, from: &F, to: &F) -> io::Result<bool> {
 /// disk. One of another user does not count, who could change it later.
 fn has_content<F: Folder>(input: &Processed, source: &Source<F>, folder: &F, name: &OsStr) -> io::Result<bool> {
     let file = match folder.open_file(name) {
-        Err(OpenError::Io(error)) if passing::passes(&error) => return Err(error),
+        // It is gone again, or may not be read.
+        Err(OpenError::Io(error)) if [ErrorKind::NotFound, ErrorKind::PermissionDenied].contains(&error.kind()) => {
+            return Ok(false);
+        }
+        Err(OpenError::Io(error)) => return Err(error),
         Err(_) => return Ok(false),
         Ok(file) => file,
     };

@@ -3,7 +3,7 @@
 //! A folder is a result if its report.json is one of planish's. What the report names in it is planish's, and goes; what
 //! commands wrote there, or people put there, is not ours, and moves on into the newer result.
 
-use crate::disk::{File, Folder, Kind, Stat};
+use crate::disk::{self, File, Folder, Kind, Rename, Stat};
 use crate::passing;
 use crate::regular::{self, OpenError};
 use crate::report;
@@ -54,8 +54,8 @@ pub enum NotKept {
 }
 
 /// Gives second names in `fresh` to what lies in `older`, which is the folder `at`, and is not `own`; where a file system
-/// has no second names, copies. What has one already is passed over if `again`. How many files, folders and links these
-/// are.
+/// has no second names, copies, which are made on the `desk`, a folder on the same file system: so none is ever seen half.
+/// What has one already is passed over if `again`. How many files, folders and links these are.
 ///
 /// # Errors
 /// [`NotKept`]; `older` is untouched in any case.
@@ -63,13 +63,13 @@ pub fn keep_foreign<F: Folder>(
     older: &F,
     at: &Path,
     own: &BTreeSet<OsString>,
-    fresh: &F,
+    (fresh, desk): (&F, &F),
     again: bool,
 ) -> Result<usize, NotKept> {
     let mut kept = 0;
     for name in names(older, at)? {
         if !own.contains(&name) {
-            kept += keep(older, at, &name, fresh, again)?;
+            kept += keep(older, at, &name, (fresh, desk), again)?;
         }
     }
     Ok(kept)
@@ -83,7 +83,7 @@ fn names<F: Folder>(folder: &F, at: &Path) -> Result<Vec<OsString>, NotKept> {
 }
 
 /// Keeps what has this name, with all that is in it.
-fn keep<F: Folder>(older: &F, at: &Path, name: &OsStr, fresh: &F, again: bool) -> Result<usize, NotKept> {
+fn keep<F: Folder>(older: &F, at: &Path, name: &OsStr, (fresh, desk): (&F, &F), again: bool) -> Result<usize, NotKept> {
     let path = at.join(name);
     let failed = |error| NotKept::Io(path.clone(), error);
     let found = older.stat_of(name).map_err(failed)?;
@@ -91,7 +91,7 @@ fn keep<F: Folder>(older: &F, at: &Path, name: &OsStr, fresh: &F, again: bool) -
         // For nobody else as long as it is not complete.
         Kind::Folder => fresh.make_folder(name, 0o700),
         Kind::Link => older.read_link(name).and_then(|target| fresh.make_link(&target, name)),
-        Kind::File => second_name(older, name, fresh),
+        Kind::File => second_name(older, name, fresh, desk),
         Kind::Other => return Err(NotKept::Stands(path)),
     };
     let is_new = match made {
@@ -104,8 +104,9 @@ fn keep<F: Folder>(older: &F, at: &Path, name: &OsStr, fresh: &F, again: bool) -
     if found.is_folder() {
         let [from, to] = [older.open_folder(name), fresh.open_folder(name)];
         let (from, to) = (from.map_err(failed)?, to.map_err(failed)?);
-        let inside = keep_foreign(&from, &path, &BTreeSet::new(), &to, again)?;
-        if is_new || inside > 0 {
+        let inside = keep_foreign(&from, &path, &BTreeSet::new(), (&to, desk), again)?;
+        let is_complete = to.stat().map_err(failed)?.mode == found.mode_of_copy();
+        if is_new || inside > 0 || !is_complete {
             complete(&found, &to).map_err(failed)?;
         }
         kept += inside;
@@ -133,21 +134,41 @@ fn complete<F: Folder>(from: &Stat, to: &F) -> io::Result<()> {
     to.sync()
 }
 
-fn second_name<F: Folder>(from: &F, name: &OsStr, to: &F) -> io::Result<()> {
+fn second_name<F: Folder>(from: &F, name: &OsStr, to: &F, desk: &F) -> io::Result<()> {
     match from.link(name, to, name) {
-        Err(error) if error.kind() != ErrorKind::AlreadyExists => copy(from, name, to),
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => copy(from, name, to, desk),
         linked => linked,
     }
 }
 
-fn copy<F: Folder>(from: &F, name: &OsStr, to: &F) -> io::Result<()> {
+fn copy<F: Folder>(from: &F, name: &OsStr, to: &F, desk: &F) -> io::Result<()> {
     let file = from.open_file(name).map_err(OpenError::into_io)?;
+    let (hidden, copy) = disk::make_unique("copy-", |hidden| desk.make_file(hidden, 0o600))?;
+    let filled = fill(&file, &copy).and_then(|()| move_to_free(desk, &hidden, to, name));
+    if filled.is_err() {
+        let _ = desk.unlink(&hidden);
+    }
+    filled
+}
+
+fn fill<F: File>(file: &F, copy: &F) -> io::Result<()> {
     let original = file.stat()?;
-    let copy = to.make_file(name, 0o600)?;
-    io::copy(&mut file.content()?, &mut Appending(&copy))?;
+    io::copy(&mut file.content()?, &mut Appending(copy))?;
     copy.set_time(original.modified)?;
     copy.set_mode(original.mode_of_copy())?;
     copy.sync()
+}
+
+/// As [`disk::rename_to_free`], also where there are no second names: then somebody may take the name in between.
+fn move_to_free<F: Folder>(from: &F, name: &OsStr, to: &F, to_name: &OsStr) -> io::Result<()> {
+    match from.rename(name, to, to_name, Rename::ToFree) {
+        Err(error) if disk::is_unsupported(&error) => {}
+        ended => return ended,
+    }
+    if to.stat_of(to_name).is_ok() {
+        return Err(ErrorKind::AlreadyExists.into());
+    }
+    from.rename(name, to, to_name, Rename::Over)
 }
 
 /// Writes to a file.
@@ -207,8 +228,9 @@ mod tests {
         fs::set_permissions(older.join("notes"), fs::Permissions::from_mode(0o2750)).expect("set");
         let own = BTreeSet::from(["ours.vtu".into()]);
         let keep_foreign = |again| {
-            let [from, to] = [&older, &fresh].map(|path| System.open(path).expect("there"));
-            keep_foreign(&from, &older, &own, &to, again)
+            let [from, to, desk] =
+                [older.as_path(), &fresh, place.path()].map(|path| System.open(path).expect("there"));
+            keep_foreign(&from, &older, &own, (&to, &desk), again)
         };
         assert_eq!(keep_foreign(false).expect("kept"), 5);
         assert_eq!(fs::read_to_string(fresh.join("notes/deep/a.txt")).expect("there"), "notes/deep/a.txt");

@@ -268,6 +268,29 @@ impl<F: Folder> Desk<F> {
         run.path.join(&self.name).join(HALF)
     }
 
+    /// What lies in the folder `older`, and is not planish's own, gets a place in `fresh`, too, on disk.
+    ///
+    /// # Errors
+    /// [`PublishError`].
+    pub fn keep_foreign(
+        &self,
+        older: &F,
+        target: &Path,
+        own: &BTreeSet<OsString>,
+        fresh: &F,
+        again: bool,
+    ) -> Result<(), PublishError> {
+        let kept = replace::keep_foreign(older, target, own, (fresh, &self.folder), again).map_err(|e| match e {
+            NotKept::Stands(path) => PublishError::Stands(path),
+            NotKept::Io(path, error) => PublishError::Io { path, error },
+        })?;
+        if kept > 0 {
+            tracing::info!(result = shown(target), kept, "files that planish did not write stay in the result");
+            fresh.sync().map_err(at(target))?;
+        }
+        Ok(())
+    }
+
     /// The result is complete: from now on, something on the desk may be wanted.
     ///
     /// # Errors
@@ -427,7 +450,7 @@ impl<F: Folder> Desk<F> {
             Some(own) => own.clone(),
             None => replace::own_files(&older).map_err(at(target))?.unwrap_or_default(),
         };
-        keep_foreign(&older, target, &known, &newer, true)
+        self.keep_foreign(&older, target, &known, &newer, true)
     }
 
     /// The older result comes back to its place; the newer one goes with the desk.
@@ -500,26 +523,4 @@ fn holds_only_own<F: Folder>(folder: &F, name: &OsStr) -> io::Result<bool> {
 
 fn is_taken(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::AlreadyExists | ErrorKind::DirectoryNotEmpty)
-}
-
-/// What lies in the folder `older`, and is not planish's own, gets a place in `fresh`, too, on disk.
-///
-/// # Errors
-/// [`PublishError`].
-pub fn keep_foreign<F: Folder>(
-    older: &F,
-    target: &Path,
-    own: &BTreeSet<OsString>,
-    fresh: &F,
-    again: bool,
-) -> Result<(), PublishError> {
-    let kept = replace::keep_foreign(older, target, own, fresh, again).map_err(|e| match e {
-        NotKept::Stands(path) => PublishError::Stands(path),
-        NotKept::Io(path, error) => PublishError::Io { path, error },
-    })?;
-    if kept > 0 {
-        tracing::info!(result = shown(target), kept, "files that planish did not write stay in the result");
-        fresh.sync().map_err(at(target))?;
-    }
-    Ok(())
 }
