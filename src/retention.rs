@@ -8,6 +8,7 @@
 //! Nothing is removed while the inbox is not there: that it is unmounted says nothing about inputs. Where an empty folder
 //! takes its place then, nobody can know that: `RequiresMountsFor=` of the service is for that.
 
+use crate::begun;
 use crate::report;
 use crate::shown::shown;
 use crate::withdraw::Standing;
@@ -83,7 +84,11 @@ fn remove(out: &Path, name: &Path) {
     let Ok(standing) = Standing::find(out, name) else { return };
     let result = shown(name);
     match standing.remove() {
-        Ok(true) => tracing::info!(result, "removed: its time is over, and its input has left the inbox"),
+        Ok(true) => {
+            // Who comes back is innocent.
+            begun::forgive(out, name);
+            tracing::info!(result, "removed: its time is over, and its input has left the inbox");
+        }
         Ok(false) => tracing::warn!(
             result,
             "its time is over, and its input has left the inbox: what planish wrote is removed, and what others put \

@@ -82,6 +82,22 @@ fn the_supervisor_hears_of_start_life_reload_and_end() {
     assert_eq!(w.wait().code(), Some(0), "{}", w.log());
 }
 
+#[test]
+fn a_supervisor_that_does_not_listen_holds_up_neither_work_nor_end() {
+    let mut w = Watched::new(&[]);
+    let bytes = disk(4, 0.0);
+    let path = w.beside("notify");
+    let _deaf = UnixDatagram::bind(&path).expect("a socket");
+    // A socket that nobody reads is full after some ten or some hundred messages.
+    w.start_with(|command| command.env("NOTIFY_SOCKET", &path).env("WATCHDOG_USEC", "20000"));
+    std::thread::sleep(Duration::from_secs(5));
+    w.drop_in("a.stl", &bytes);
+    w.wait_for(&[("a.stl", &bytes)]);
+    let since = Instant::now();
+    w.stop();
+    assert!(since.elapsed() < Duration::from_secs(8), "{:?}", since.elapsed());
+}
+
 /// The daemon itself goes on: only what it has on its way stands still.
 #[test]
 fn the_watchdog_hears_of_work_and_not_of_a_loop_that_turns() {
