@@ -36,6 +36,9 @@ use tracing::level_filters::LevelFilter;
 /// How often a child is looked at: whether it is wanted, and in time.
 const POLL: Duration = Duration::from_millis(20);
 
+/// How long a child may take to end when it has said that its job has ended.
+const LINGERING: Duration = Duration::from_secs(5);
+
 /// Lines of standard error that are kept as evidence, and how long each may be, in bytes.
 const EVIDENCE: (usize, u64) = (8, 4096);
 
@@ -94,7 +97,8 @@ pub(super) fn run(travel: &Travel, folder: &Path) -> io::Result<Outcome> {
             Ok((channels, guard))
         });
         let followed = helpers.map(|(channels, guard)| (line.follow(stdout, &channels), guard));
-        let status = if followed.is_ok() { await_end(&child) } else { end(&child) };
+        let has_told = matches!(followed, Ok((Some(_), _)));
+        let status = if has_told { await_end(&child) } else { end(&child) };
         ended.store(true, Ordering::Relaxed);
         let (ending, guard) = followed?;
         Ok((ending, guard.join().unwrap_or(None), status?))
@@ -103,8 +107,9 @@ pub(super) fn run(travel: &Travel, folder: &Path) -> io::Result<Outcome> {
     let (ending, ended_by_guard, status) = followed?;
     Ok(match (ended_by_guard, ending) {
         (Some(outcome), _) => outcome,
-        (None, Some(ending)) if status.success() => Outcome::Ended(ending),
-        (None, _) => Outcome::Died(Death { status, last_words: evidence.into_inner().into() }),
+        // Its files were on disk before it told: how it ends after that is all the same.
+        (None, Some(ending)) => Outcome::Ended(ending),
+        (None, None) => Outcome::Died(Death { status, last_words: evidence.into_inner().into() }),
     })
 }
 
@@ -162,17 +167,19 @@ fn spawn<'scope, T: Send + 'scope>(
     Builder::new().name(name.to_owned()).spawn_scoped(scope, body)
 }
 
-/// Waits for the end of a child that says no more: it comes at once, or its guard brings it.
+/// Waits for the end of a child that has said its last word, and ends it where it lingers.
 fn await_end(child: &Mutex<Child>) -> io::Result<ExitStatus> {
-    loop {
+    let told = Instant::now();
+    while told.elapsed() < LINGERING {
         if let Some(status) = child.lock().try_wait()? {
             return Ok(status);
         }
         std::thread::sleep(Duration::from_millis(1));
     }
+    end(child)
 }
 
-/// Ends a child by force.
+/// Ends a child by force. One that has died already keeps the status with which it did.
 fn end(child: &Mutex<Child>) -> io::Result<ExitStatus> {
     let mut child = child.lock();
     child.kill()?;
