@@ -104,7 +104,7 @@ impl Page {
         values: &[(&str, f64)],
     ) -> prometheus::Result<()> {
         let options = Opts::new(name, help).namespace("planish");
-        let (counters, gauges) = (CounterVec::new(options.clone().into(), label)?, GaugeVec::new(options, label)?);
+        let (counters, gauges) = (CounterVec::new(options.clone(), label)?, GaugeVec::new(options, label)?);
         for (value_of_label, value) in values {
             let labels = if label.is_empty() { &[][..] } else { &[*value_of_label][..] };
             match kind {
