@@ -126,7 +126,7 @@ impl Suspect {
     /// The mark cannot be written.
     pub fn begin(&mut self) -> io::Result<()> {
         self.is_marked = true;
-        fs::write(&self.mark, serde_json::to_vec(&self.entry)?)
+        make(&self.mark, &self.entry).map(drop)
     }
 
     /// One more process has died of this input.
@@ -161,10 +161,20 @@ impl Drop for Suspect {
 pub fn begin_apart(mark: &Path, entry: &Entry) -> io::Result<File> {
     let name = mark.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let fresh = mark.with_file_name(format!("{FRESH}{name}"));
-    let mut file = File::options().write(true).create(true).truncate(true).open(&fresh)?;
-    file.write_all(&serde_json::to_vec(entry)?)?;
+    let file = make(&fresh, entry)?;
     file.try_lock()?;
     fs::rename(fresh, mark)?;
+    Ok(file)
+}
+
+/// Makes a mark; what has its name, whatever that is, goes.
+fn make(path: &Path, entry: &Entry) -> io::Result<File> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+        Ok(()) | Err(_) => {}
+    }
+    let mut file = File::options().read(true).write(true).create_new(true).open(path)?;
+    file.write_all(&serde_json::to_vec(entry)?)?;
     Ok(file)
 }
 
@@ -196,7 +206,10 @@ fn take_over_one(staging: &Path, path: &Path) -> io::Result<()> {
     let Some(name) = path.file_name().and_then(|n| n.to_str()) else { return Ok(()) };
     let folder = System.open(path.parent().unwrap_or(path))?;
     let lock = own::open_lock_there(&folder, name.as_ref())?;
-    own::lock(&lock, path, ORPHAN, || true)?;
+    if !own::lock(&lock, path, ORPHAN, || true)? {
+        // It lives still.
+        return Ok(());
+    }
     let (Some(mut entry), Some(file)) = (read(path), name.strip_prefix(MARK)) else { return Ok(()) };
     if entry.boot != boot() {
         return Ok(());

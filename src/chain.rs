@@ -48,6 +48,8 @@ pub enum Followed {
     BrokenOff,
     /// All is done but that the input is put away: it is too early for that.
     Until(Instant),
+    /// All is done but that the input is put away: somebody has it open for writing.
+    Busy,
     /// All is done but that the input is put away: its content is no longer what was processed, whether that shows or
     /// not. It is to be processed again.
     Changed,
@@ -150,7 +152,7 @@ fn done_with(
     Ok(match put_away(&System, &Processed { inbox, name: &job.name, look, hash }, way)? {
         Fate::Busy => {
             tell_once(&job.path);
-            Followed::Until(Instant::now() + QUIET)
+            Followed::Busy
         }
         ended => {
             BUSY.lock().remove(&job.path);

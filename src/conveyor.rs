@@ -30,7 +30,7 @@ mod writing;
 use crate::begun::Begun;
 use crate::chain::{self, Followed};
 use crate::job::{Done, End, Job, Stage, Stopped};
-use crate::outcome::Status;
+use crate::outcome::{Code, Reason, Status};
 use crate::publish::{PublishError, Publisher};
 use crate::report::Report;
 use crate::settings::Settings;
@@ -102,11 +102,12 @@ impl Conveyor {
     /// # Errors
     /// Where the system has no more threads.
     pub fn start_apart(settings: &Settings, folder: &Path, bytes: u64, parent: Arc<Parent>) -> std::io::Result<Self> {
-        let mut conveyor = Self::idle(settings, Sink::Folder(folder.to_owned()), parent, None, false);
+        let mut conveyor = Self::idle(settings, Sink::Folder(folder.to_owned()), parent, None, true);
         // Nothing follows in this process.
         let (chain, _) = bounded(1);
-        let (parked, _) = bounded(1);
-        conveyor.belt(queue::belt(bytes), &Arc::new(After { chain, parked }))?;
+        let (parked, to_look_after) = bounded(1);
+        conveyor.belt(queue::belt(bytes), &Arc::new(After { chain: chain.clone(), parked }))?;
+        conveyor.thread("parked", move || writing::look_after(to_look_after, &chain))?;
         Ok(conveyor)
     }
 
@@ -360,6 +361,10 @@ fn follow_up(Chained { travel, done }: Chained) {
         Ok(Followed::Whole) => End::Done(done),
         Ok(Followed::BrokenOff) => End::Unwanted,
         Ok(Followed::Until(then)) => End::Later(done, then),
+        Ok(Followed::Busy) => {
+            let message = "somebody has it open for writing: it is put away when it is closed";
+            End::Again(Reason::new(Code::Unreadable, message))
+        }
         Ok(Followed::Changed) => {
             tracing::info!(
                 "changed since it was read, whether its size and times show it or not: it is processed again"

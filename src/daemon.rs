@@ -130,7 +130,10 @@ impl<'a> Daemon<'a> {
         self.look(Instant::now());
         self.supervisor.ready();
         loop {
-            self.hold_lock()?;
+            if let Err(gone) = self.hold_lock() {
+                self.abandon();
+                return Err(gone);
+            }
             let now = Instant::now();
             if self.phase == Phase::Watching && now >= self.next_look {
                 self.look(now);
@@ -171,6 +174,16 @@ impl<'a> Daemon<'a> {
         }
         self.is_lock_unknown = matches!(held, Held::Unknown(_));
         Ok(())
+    }
+
+    /// There is no place for results any more: all jobs end, and what was started for them.
+    fn abandon(&self) {
+        self.conveyor.close();
+        self.jobs.values().for_each(|job| job.cancel());
+        let latest = Instant::now() + PATIENCE;
+        while !self.conveyor.running().is_empty() && Instant::now() < latest {
+            let _ = self.conveyor.next(Duration::from_millis(50));
+        }
     }
 
     /// Says what an operator must act on.

@@ -68,6 +68,7 @@ impl Health {
                 tells(seen, told),
                 publishes(seen, told),
                 errs(seen, told),
+                goes_on(told),
                 is_in_time(seen, told),
                 is_heard(seen, told),
             ]);
@@ -110,6 +111,14 @@ fn errs(seen: &Seen, told: &Status) -> Fact {
     let is_over = told.last_published.is_some_and(|published| published >= error.when);
     let what = if is_over { ", and results were put in place since" } else { "" };
     fact("error", is_over, format!("{}{what}: {}", ago(seen, error.when), error.message))
+}
+
+fn goes_on(told: &Status) -> Fact {
+    let held_up: Vec<_> = told.running.iter().filter_map(|job| Some((&job.name, job.trouble.as_ref()?))).collect();
+    match held_up.first() {
+        None => fact("work", true, "nothing that is on its way is held up"),
+        Some((name, trouble)) => fact("work", false, format!("{} held up; {name}: {trouble}", held_up.len())),
+    }
 }
 
 fn is_in_time(seen: &Seen, told: &Status) -> Fact {

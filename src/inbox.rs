@@ -208,9 +208,11 @@ impl Inbox {
         }
     }
 
-    /// All files are looked at anew, as if they had just come: what is up to date is found to be so.
+    /// All files are looked at anew, as if they had just come: what is up to date is found to be so. What was delivered is
+    /// not: its result was taken away on purpose.
     pub fn forget_all(&mut self, now: Instant) {
-        let at_rest = self.files.values_mut().filter(|file| file.state != State::Submitted);
+        let is_at_rest = |state: &State| !matches!(state, State::Submitted | State::Done(Rest::Delivered, _));
+        let at_rest = self.files.values_mut().filter(|file| is_at_rest(&file.state));
         at_rest.for_each(|file| *file = File::new(file.seen.clone(), now));
     }
 
@@ -355,8 +357,10 @@ mod tests {
         );
         inbox.forget(&name, now);
         assert_eq!(settled(&inbox.look(&files, now + SETTLE)), ["a.stl"]);
-        let (mut delivered, _, _) = done(Rest::Delivered, None);
+        let (mut delivered, files, now) = done(Rest::Delivered, None);
         assert!(delivered.published(1).is_empty());
+        delivered.forget_all(now);
+        assert!(delivered.look(&files, now + 9 * SETTLE).is_empty(), "nor with other settings");
     }
 
     #[test]

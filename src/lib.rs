@@ -22,6 +22,7 @@ mod lease;
 pub mod ledger;
 pub mod logging;
 pub mod look;
+pub mod machine;
 pub mod metrics;
 pub mod outcome;
 pub mod own;

@@ -24,6 +24,7 @@ use std::ffi::{OsStr, OsString};
 use std::io::{self, ErrorKind};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The hidden folder for what is not complete yet.
 pub const STAGING: &str = ".planish";
@@ -47,6 +48,8 @@ pub struct Publisher<D: Disk = System> {
 pub struct Staged<D: Disk = System> {
     run: Arc<Run<D::Folder>>,
     desk: Desk<D::Folder>,
+    /// Whether it was tried to put it in place before.
+    is_tried: AtomicBool,
 }
 
 impl<D: Disk> Staged<D> {
@@ -57,7 +60,7 @@ impl<D: Disk> Staged<D> {
 
     /// Whether it is still there: somebody may have removed it.
     pub fn is_there(&self) -> bool {
-        self.desk.half().is_ok() && self.folder().exists()
+        self.desk.half().is_ok()
     }
 }
 
@@ -73,12 +76,16 @@ fn bury(staging: &Path) {
     begun::take_over(staging);
 }
 
-/// Writes the files of a result to a folder, for another process that puts it in place.
+/// Writes the files of a result to a folder, for another process that puts it in place. What an attempt before has left there
+/// goes.
 ///
 /// # Errors
 /// [`PublishError`].
 pub fn write_to(folder: &Path, files: &[Content]) -> Result<(), PublishError> {
     let half = System.open(folder).map_err(at(folder))?;
+    for name in half.list().map_err(at(folder))? {
+        disk::remove_all(&half, &name).map_err(at(folder))?;
+    }
     staging::write_all(&half, files).map_err(at(folder))
 }
 
@@ -123,6 +130,14 @@ pub enum PublishError {
          renaming; unmount it, or use another output folder", shown(.0)
     )]
     Elsewhere(PathBuf),
+    /// The process of the input told this.
+    #[error("{message}")]
+    Told {
+        /// What is wrong and what to do.
+        message: String,
+        /// Whether it stays as long as nobody changes something.
+        lasts: bool,
+    },
     /// The program is ending.
     #[error("nothing is published any more, as planish ends; start it again")]
     Closed,
@@ -134,6 +149,7 @@ impl PublishError {
         match self {
             Self::Foreign(_) | Self::Nested(_) | Self::Stands(_) | Self::Elsewhere(_) => true,
             Self::Io { error, .. } => passing::lasts(error),
+            Self::Told { lasts, .. } => *lasts,
             Self::Report(_) | Self::Busy(_) | Self::Closed => false,
         }
     }
@@ -235,7 +251,7 @@ impl<D: Disk> Publisher<D> {
     pub fn room(&self) -> Result<Staged<D>, PublishError> {
         let run = self.run()?;
         let desk = Desk::make(&run).map_err(at(&run.path))?;
-        let staged = Staged { run, desk };
+        let staged = Staged { run, desk, is_tried: AtomicBool::new(false) };
         staged.desk.make_half().map_err(at(&staged.run.path))?;
         Ok(staged)
     }
@@ -246,7 +262,7 @@ impl<D: Disk> Publisher<D> {
     /// # Errors
     /// [`PublishError`]; then an older result is untouched.
     pub fn put(&self, name: &Path, staged: &Staged<D>, wanted: impl Fn() -> bool) -> Result<bool, PublishError> {
-        let Staged { run, desk } = staged;
+        let Staged { run, desk, is_tried } = staged;
         let target = self.target(name);
         let half = desk.half().map_err(at(&target))?;
         // One at a time, of all processes, so that what is no longer wanted never takes the place of what came after it.
@@ -266,7 +282,8 @@ impl<D: Disk> Publisher<D> {
         let last = name.file_name().unwrap_or_default();
         match folder.open_folder(last) {
             Ok(older) => {
-                desk.keep_foreign(&older, &target, &own, &half, false)?;
+                let again = is_tried.swap(true, Ordering::Relaxed);
+                desk.keep_foreign(&older, &target, &own, &half, again)?;
                 // It comes to lie on the desk, which must be found there.
                 run.folder.sync().map_err(at(&run.path))?;
             }
@@ -277,7 +294,8 @@ impl<D: Disk> Publisher<D> {
         let put = desk.put_in_place(&folder, last);
         let settled = desk.settle(&self.disk, &self.out, &promise, Some(&own));
         if put.is_err() && settled.is_ok() {
-            desk.take_back(&promise).map_err(at(&target))?;
+            // Where that fails, it is not there any more, and is made again.
+            let _ = desk.take_back(&promise);
         }
         put.map_err(|error| not_put(error, &folder, &target))?;
         match settled? {
@@ -373,7 +391,7 @@ fn not_put<F: Folder>(error: io::Error, folder: &F, target: &Path) -> PublishErr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::disk::simulated::{Abilities, Simulated};
+    use crate::disk::simulated::{Abilities, Plan, Simulated};
     use crate::staging::LOCK;
     use std::fs;
 
@@ -498,6 +516,40 @@ mod tests {
         drop(publisher);
         let hidden = fs::read_dir(out.path().join(STAGING)).expect("there").flatten().map(|e| e.file_name());
         assert_eq!(hidden.collect::<Vec<_>>(), [GATE]);
+    }
+
+    /// Whatever fails once: what is on its desk is put in place the next time, with all that others have put there.
+    #[test]
+    fn a_result_that_could_not_be_put_in_place_is_put_there_later() {
+        let (out, name) = (Path::new("/out"), Path::new("part.stl"));
+        let mut tried_again = 0;
+        for failing in 0.. {
+            let disk = Simulated::new(Abilities::ALL);
+            let older = Publisher::open_on(disk.clone(), out).expect("opens");
+            older.publish(name, &files("older"), || true).expect("published");
+            disk.put("/out/part.stl/notes.txt", b"mine");
+            drop(older);
+            let faulty = disk.process(1, Plan { fail: Some((failing, Errno::IO)), ..Plan::default() });
+            let Ok(publisher) = Publisher::open_on(faulty.clone(), out) else { continue };
+            let Ok(staged) = publisher.room() else { continue };
+            let half = staged.desk.half().and_then(|half| staging::write_all(&half, &files("newer")));
+            if half.is_err() {
+                continue;
+            }
+            let put = publisher.put(name, &staged, || true);
+            if put.is_err() && staged.is_there() {
+                tried_again += 1;
+                assert!(publisher.put(name, &staged, || true).expect("put in place"), "operation {failing}");
+            }
+            if put.is_ok() || staged.is_there() {
+                assert_eq!(disk.file("/out/part.stl/b.txt").as_deref(), Some(&b"newer"[..]), "operation {failing}");
+            }
+            assert_eq!(disk.file("/out/part.stl/notes.txt").as_deref(), Some(&b"mine"[..]), "operation {failing}");
+            if faulty.counts().0 <= failing {
+                break;
+            }
+        }
+        assert!(tried_again > 10, "only {tried_again}: the test has lost its sense");
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod values;
 
 use crate::formats::Limits;
 use crate::hooks::{Hook, HookRefused, Occasion};
+use crate::machine;
 use crate::shown::shown;
 use bytesize::ByteSize;
 use pipeline::Order;
@@ -256,15 +257,6 @@ fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get).min(MOST_JOBS)
 }
 
-/// The memory of the machine, or of the control group (the container) in which this process runs; a little, where the
-/// system does not tell.
-fn memory_of_the_machine() -> u64 {
-    let Ok(mut system) = sysinfo::System::new() else { return ByteSize::gib(2).as_u64() };
-    system.refresh_memory();
-    let of_group = system.cgroup_limits().map(|limits| limits.total_memory).filter(|total| *total > 0);
-    of_group.map_or(system.total_memory(), |group| group.min(system.total_memory()))
-}
-
 impl Said {
     /// Reads planish.toml.
     ///
@@ -351,7 +343,7 @@ impl Said {
         if !(1..=MOST_COMMANDS).contains(&commands) {
             return Err(SettingsError::Commands(commands));
         }
-        let machine_memory = memory_of_the_machine();
+        let machine_memory = machine::memory();
         let memory = self.memory.unwrap_or_else(|| ByteSize::b(machine_memory / 2).max(LEAST_MEMORY));
         if memory < LEAST_MEMORY {
             return Err(SettingsError::Memory(memory));

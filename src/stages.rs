@@ -75,6 +75,10 @@ pub fn read_input(job: &Job, settings: &Settings) -> Result<Vec<u8>, Unread> {
 /// Why not.
 pub fn hash_input(job: &Job, settings: &Settings) -> Result<(blake3::Hash, u64), Unread> {
     let (file, most) = (open_input(job)?, settings.limits.file);
+    let size = file.metadata().map_err(OpenError::Io)?.len();
+    if size > most {
+        return Err(OpenError::TooLarge { size, most }.into());
+    }
     let mut hasher = blake3::Hasher::new();
     let read = hasher.update_reader(file.take(most.saturating_add(1))).map_err(OpenError::Io);
     let size = read?.count();

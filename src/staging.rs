@@ -40,6 +40,9 @@ const PLACE: &str = "place";
 /// How often the lock of an output folder is looked for that was removed while somebody waited for it.
 const GATES: usize = 8;
 
+/// Nobody else has anything to do in a staging folder.
+const PRIVATE_FOLDER: u32 = 0o700;
+
 /// What is done about a process that died, before its staging folder is cleared.
 pub type Bury = fn(&Path);
 
@@ -78,7 +81,7 @@ impl<F: Folder> Run<F> {
         let _opening = pass_gate(disk, out, wanted)?.ok_or_else(|| PublishError::Busy(path.join(GATE)))?;
         let root = root(disk, out)?;
         clear_stale(disk, out, &root, bury);
-        let (name, folder) = disk::make_unique_folder(&root, RUN, OPEN_FOLDER).map_err(at(&path))?;
+        let (name, folder) = disk::make_unique_folder(&root, RUN, PRIVATE_FOLDER).map_err(at(&path))?;
         let path = path.join(&name);
         // It is new, and nobody else's.
         let lock = own::open_lock(&folder, LOCK.as_ref()).map_err(at(&path))?;
@@ -299,7 +302,12 @@ impl<F: Folder> Desk<F> {
         let promise = Promise { number: half.stat()?.identity.number(), name: name.to_owned() };
         let mut text = format!("{}/", promise.number).into_bytes();
         text.extend(name.as_os_str().as_bytes());
-        self.folder.make_link(&OsString::from_vec(text), PLACE)?;
+        let text = OsString::from_vec(text);
+        match self.folder.make_link(&text, PLACE) {
+            // Of an attempt that failed after that.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists && self.folder.read_link(PLACE)? == text => {}
+            made => made?,
+        }
         self.folder.rename(HALF, &self.folder, WHOLE, Rename::Over)?;
         Ok(promise)
     }

@@ -4,7 +4,7 @@
 //! told by its lock on `OUT/.planish/watch.lock`, which the system takes back even where the daemon was killed.
 
 use crate::conveyor::board::Running;
-use crate::disk::System;
+use crate::disk::{self, Disk, File as _, Folder, OPEN_FILE, Rename, System};
 use crate::inbox::Notable;
 use crate::look::Identity;
 use crate::outcome::{Code, Status as Outcome};
@@ -327,17 +327,28 @@ impl Lock {
     /// # Errors
     /// Where the file cannot be written.
     pub fn tell(&self, status: &Status, staging: &Path) -> io::Result<()> {
-        // Whoever may read the results may read this: a temporary file would be its owner's alone.
-        let fresh = staging.join("status.fresh");
-        fs::write(&fresh, serde_json::to_vec(status)?)?;
-        fs::rename(fresh, self.status())
+        let staging = System.open(staging)?;
+        // Whoever may read the results may read this: a temporary file would be its owner's alone. It is made anew each time,
+        // so that nothing is followed that somebody else put there. It need not survive the machine.
+        let (fresh, file) = disk::make_unique("status-", |fresh| staging.make_file(fresh, OPEN_FILE))?;
+        file.append(&serde_json::to_vec(status)?)?;
+        let root = System.open(&self.out.join(STAGING))?;
+        let placed = staging.rename(&fresh, &root, STATUS, Rename::Over);
+        if placed.is_err() {
+            let _ = staging.unlink(&fresh);
+        }
+        placed
     }
 }
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // It may never have been written.
-        let _ = fs::remove_file(self.status());
+        let there = fs::metadata(self.path()).map(|m| Identity::of(&m));
+        let is_ours = there.is_ok_and(|there| self.lock.metadata().is_ok_and(|held| Identity::of(&held) == there));
+        if is_ours {
+            // It may never have been written.
+            let _ = fs::remove_file(self.status());
+        }
     }
 }
 

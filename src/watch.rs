@@ -12,6 +12,7 @@ use crate::conveyor::{Conveyor, Ended};
 use crate::formats::{self, Kind};
 use crate::inbox::{Listing, Seen};
 use crate::look::{Identity, Look};
+use crate::passing;
 use crate::shown::shown;
 use crossbeam_channel::{Receiver, Sender, after, bounded, select};
 use notify::event::{AccessKind, AccessMode, EventKind};
@@ -224,39 +225,47 @@ impl Eyes {
         let inbox = self.inbox.clone();
         for entry in WalkDir::new(&inbox).max_depth(depth).into_iter().filter_entry(is_open) {
             match entry {
-                Ok(entry) => {
-                    if let Some((name, look)) = self.see(&entry) {
-                        listing.insert(name, look);
+                Ok(entry) => match self.see(&entry) {
+                    Ok(Some((name, look))) => drop(listing.insert(name, look)),
+                    Ok(None) => {}
+                    // What cannot be seen at the moment has not gone.
+                    Err(error) if passing::passes(&error) => return Err(error),
+                    Err(error) => tracing::debug!("passed over: {error}"),
+                },
+                Err(error) => {
+                    let is_whole = error.depth() == 0;
+                    let error = io::Error::from(error);
+                    // Files may go at any moment; where the system is in trouble, nothing is known.
+                    if is_whole || passing::passes(&error) {
+                        return Err(error);
                     }
+                    tracing::debug!("passed over: {error}");
                 }
-                // Files may go at any moment; of the folder as a whole, nothing is known then.
-                Err(error) if error.depth() == 0 => return Err(error.into()),
-                Err(error) => tracing::debug!("passed over: {error}"),
             }
         }
         Ok(listing)
     }
 
     /// A file that may hold a mesh, by its path below the inbox.
-    fn see(&mut self, entry: &DirEntry) -> Option<(PathBuf, Seen)> {
-        let name = entry.path().strip_prefix(&self.inbox).ok()?;
+    fn see(&mut self, entry: &DirEntry) -> io::Result<Option<(PathBuf, Seen)>> {
+        let Ok(name) = entry.path().strip_prefix(&self.inbox) else { return Ok(None) };
         if !matches!(formats::kind(name), Kind::Mesh(_) | Kind::OtherMesh(_)) {
-            return None;
+            return Ok(None);
         }
         let kind = entry.file_type();
         let look = if kind.is_file() {
-            Look::of(&entry.metadata().ok()?)
+            Some(Look::of(&entry.metadata()?))
         } else if kind.is_symlink() && self.leads_inside(entry.path()) {
-            Look::at(entry.path()).ok()??
+            Look::at(entry.path())?
         } else {
             if !kind.is_dir() && self.passed_over.insert(name.to_owned()) {
                 tracing::warn!(input = shown(name), "passed over: no regular file of the inbox; copy the file itself");
             }
-            return None;
+            None
         };
         let asked = self.beside.get(name).into_iter().flatten();
         let beside = asked.map(|file| Look::at(&entry.path().with_file_name(file)).ok().flatten());
-        Some((name.to_owned(), Seen { look, beside: beside.collect() }))
+        Ok(look.map(|look| (name.to_owned(), Seen { look, beside: beside.collect() })))
     }
 
     /// Whether a symbolic link leads to something in the inbox. Others are not followed: whoever may drop files must not

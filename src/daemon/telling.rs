@@ -7,7 +7,7 @@ use crate::inbox::Notable;
 use crate::job::Stage;
 use crate::metrics::More;
 use crate::pulse::Vitals;
-use crate::status::{self, NAMED, Noted, Progress};
+use crate::status::{self, NAMED, Noted, Progress, Trouble};
 use crate::{conveyor, logging, room, vitals};
 use std::time::Instant;
 
@@ -93,6 +93,10 @@ impl Daemon<'_> {
         status.waiting = waiting.len();
         status.next = waiting.iter().take(NAMED).map(|job| job.name.to_string_lossy().into_owned()).collect();
         status.running = self.conveyor.running().into_iter().map(Progress::from).collect();
+        let troubles = status.running.iter().filter_map(|job| job.trouble.as_ref());
+        if let Some(trouble) = troubles.min().filter(|t| status.last_error.as_ref().is_none_or(|e| e.message != **t)) {
+            status.last_error = Some(Trouble::now(trouble));
+        }
         status.unsettled = self.inbox.unsettled();
         status.notables = self.inbox.notable().count();
         status.notable = self.inbox.notable().take(NAMED).map(Noted::from).collect();

@@ -4,7 +4,7 @@ use super::Exit;
 use crate::begun;
 use crate::cli::Apart;
 use crate::conveyor::apart::parent::Parent;
-use crate::conveyor::apart::protocol::{Ending, Order, Said};
+use crate::conveyor::apart::protocol::{Ending, Order, Said, say};
 use crate::conveyor::{Conveyor, Ended};
 use crate::job::{End, Job};
 use crate::outcome::{Code, Reason};
@@ -32,20 +32,30 @@ pub fn job(asked: &Apart, settings: &Settings) -> Result<Exit, Box<dyn std::erro
         .map_err(|e| format!("{e}: `planish job` is started by planish itself; use `planish run`"))?;
     // Before it is known whether the parent lives: else its death could be overlooked.
     let _until_the_end = begin(asked, &order);
+    be_expendable(order.memory);
+    let done = start(asked, order.applied_to(settings.clone()));
+    asked.mark.iter().for_each(|mark| begun::end_apart(mark));
+    if let Err(error) = done {
+        // That says nothing about the input.
+        let reason = Reason::new(Code::Internal, super::no_threads(&error));
+        say(&mut io::stdout(), &Said::Ended(Ending::Again(reason)))?;
+    }
+    Ok(Exit::Success)
+}
+
+/// Starts the stages, and sees the job through.
+fn start(asked: &Apart, settings: Settings) -> io::Result<()> {
     let mark = asked.mark.clone();
     let parent = Parent::listen(move || mark.iter().for_each(|mark| begun::end_apart(mark)))?;
-    be_expendable(order.memory);
-    let settings = order.applied_to(settings.clone());
     let job = Arc::new(job_of(asked));
-    let conveyor =
-        Conveyor::start_apart(&settings, &asked.into, job.bytes, parent.clone()).map_err(|e| super::no_threads(&e))?;
+    let conveyor = Conveyor::start_apart(&settings, &asked.into, job.bytes, parent.clone())?;
     conveyor.submit(job.clone());
     conveyor.close();
     let ended = follow(&conveyor, &parent);
     asked.mark.iter().for_each(|mark| begun::end_apart(mark));
     parent.say(&Said::Beside { names: job.beside() });
     parent.say(&Said::Ended(ending(ended)));
-    Ok(Exit::Success)
+    Ok(())
 }
 
 /// Marks the input as on its way.
@@ -81,10 +91,10 @@ fn follow(conveyor: &Conveyor, parent: &Parent) -> End {
         if let Some(Ended { end, .. }) = conveyor.next(TELL) {
             return end;
         }
-        let progress = conveyor.running().pop().map(|job| (job.stage, job.charts_done, job.charts));
-        if let Some((stage, charts_done, charts)) = progress.filter(|now| Some(*now) != told) {
-            parent.say(&Said::Progress { stage, charts_done, charts });
-            told = progress;
+        let now = conveyor.running().pop().map(|job| (job.stage, job.charts_done, job.charts, job.trouble));
+        if let Some((stage, charts_done, charts, trouble)) = now.clone().filter(|_| now != told) {
+            parent.say(&Said::Progress { stage, charts_done, charts, trouble });
+            told = now;
         }
     }
 }
@@ -95,7 +105,7 @@ fn ending(end: End) -> Ending {
         End::Changed | End::Unwanted | End::Same => Ending::Changed,
         End::Waiting(reason) => Ending::Waiting(reason),
         End::Again(reason) => Ending::Again(reason),
-        End::Unwritten(error) => Ending::Again(Reason::new(Code::Internal, error)),
+        End::Unwritten(error) => Ending::Unwritten { message: error.to_string(), lasts: error.is_lasting() },
         End::Lost => Ending::Lost,
     }
 }

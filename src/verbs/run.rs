@@ -30,8 +30,8 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     let jobs = inputs::collect(paths)?;
     inputs::refuse_same_names(&jobs)?;
     inputs::refuse_inside(&jobs, out)?;
+    let stop = signals::listen(Hangup::Stop, false)?;
     let publisher = Arc::new(Publisher::open(out)?);
-    let stop = signals::listen(Hangup::Stop)?;
     let conveyor = Conveyor::start(settings, publisher.clone(), false).map_err(|e| super::no_threads(&e))?;
     let jobs: Vec<Arc<Job>> = jobs.into_iter().map(Arc::new).collect();
     jobs.iter().for_each(|job| conveyor.submit(job.clone()));

@@ -36,11 +36,13 @@ pub fn watch(
     if takes_inputs_out(settings) {
         holding::try_out(&System, inbox)?;
     }
+    // First: who asks to stop while all this begins is heard, too.
+    let hangup = if asked.common.config.is_some() { Hangup::Reload } else { Hangup::Stop };
+    let stop = signals::listen(hangup, settings.drain)?;
     let publisher = Arc::new(Publisher::open(out)?);
     let mut lock = Lock::take(out)?;
     holding::recover(&System, inbox, settings.recursive);
     destinations(settings).for_each(|(_, folder)| holding::clear(&System, folder, settings.recursive));
-    let stop = signals::listen(if asked.common.config.is_some() { Hangup::Reload } else { Hangup::Stop })?;
     let conveyor = Conveyor::start(settings, publisher.clone(), true).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
     let source = Source { read, is_possible: &|settings| can_go(inbox, out, settings) };

@@ -75,6 +75,26 @@ fn what_cannot_be_opened_now_is_read_later() {
     w.assert_complete("a.stl", Status::Certified);
 }
 
+/// What cannot be seen for a moment is not gone.
+#[test]
+fn a_folder_that_cannot_be_read_now_cancels_nothing() {
+    let mut w = Watched::new(&["--jobs", "1", "--recursive"]);
+    fs::create_dir(w.inbox().join("sub")).expect("made");
+    let bytes = disk(120, 0.0);
+    w.drop_in("sub/a.stl", &bytes);
+    w.start();
+    w.wait_until("it is on its way", |w| w.is_running("sub/a.stl"));
+    // Enough for the inbox, but not for what is in it.
+    limit_handles(&w, lowest_free_handle(&w) + 1);
+    fs::write(w.inbox().join("hint.stl~"), "").expect("written");
+    std::thread::sleep(Duration::from_secs(2));
+    limit_handles(&w, 1 << 10);
+    w.wait_for(&[("sub/a.stl", &bytes)]);
+    w.stop();
+    assert_eq!(w.logged("sub/a.stl", "begins"), 1, "{}", w.log());
+    assert!(!w.log().contains("the job is cancelled"), "{}", w.log());
+}
+
 #[test]
 fn a_result_that_is_removed_is_made_again() {
     let mut w = Watched::new(&[]);

@@ -1,10 +1,10 @@
 //! What an input takes or dies of is its own affair.
 
 use super::{PATIENCE, Watched, disk};
-use crate::support::Out;
+use crate::support::{Out, planish};
 use planish::outcome::{Code, Status};
 use planish::report::Report;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
 use std::fs;
 use std::process::Command;
 use std::time::Instant;
@@ -65,6 +65,66 @@ fn an_input_of_which_planish_dies_twice_is_put_aside_and_all_else_is_done() {
     w.assert_tidy(&["large.stl", "small.stl"]);
 }
 
+/// Others wait for memory that such a process has.
+#[test]
+fn a_process_that_dies_gives_back_what_it_held() {
+    let mut w = Watched::new(&["--jobs", "2", "--memory", "16MiB"]);
+    let inputs: Vec<(String, Vec<u8>)> = (0..4)
+        .map(|i| (format!("{i}.stl"), disk(110, f64::from(i))))
+        .chain([("small.stl".to_owned(), disk(5, 0.0))])
+        .collect();
+    inputs.iter().for_each(|(name, bytes)| w.drop_in(name, bytes));
+    w.start();
+    let mut last = None;
+    for _ in 0..4 {
+        last = Some(kill_child(&w, last));
+        std::thread::sleep(std::time::Duration::from_millis(700));
+    }
+    w.wait_for(&inputs.iter().map(|(name, bytes)| (name.as_str(), &bytes[..])).collect::<Vec<_>>());
+    w.stop();
+    w.assert_complete("small.stl", Status::Certified);
+}
+
+/// A disk that has no room: the process of the input keeps its result, and people are told.
+#[test]
+fn what_the_process_of_an_input_cannot_write_is_not_computed_again() {
+    let mut w = Watched::new(&["--jobs", "2"]);
+    let large = disk(110, 0.0);
+    w.drop_in("large.stl", &large);
+    w.start();
+    w.wait_until("it has a process", |w| !children(w.pid()).is_empty());
+    w.wait_until("it is computed", |w| w.is_running("large.stl"));
+    let child = Pid::from_raw(children(w.pid())[0]).expect("not 0");
+    let handles = |most| Rlimit { current: Some(most), maximum: Some(1 << 10) };
+    prlimit(Some(child), Resource::Nofile, handles(3)).expect("set");
+    let is_held_up = |w: &Watched| w.status()["running"][0]["trouble"].as_str().is_some();
+    w.wait_until("its result cannot be written", is_held_up);
+    let health = || planish(["status".as_ref(), "--health".as_ref(), "--out".as_ref(), w.out.path().as_os_str()]);
+    let told = health();
+    assert!(told.code == Some(1) && told.out.contains("held up"), "{}", told.out);
+    prlimit(Some(child), Resource::Nofile, handles(1 << 10)).expect("set");
+    w.wait_for(&[("large.stl", &large)]);
+    assert_eq!(w.logged("large.stl", "begins"), 1, "{}", w.log());
+    w.stop();
+    w.assert_complete("large.stl", Status::Certified);
+}
+
+/// As hardened services are run: only processes are shown below /proc.
+#[test]
+fn what_the_system_does_not_tell_refuses_nothing() {
+    let out = Out::new();
+    let script = "mount -t proc -o subset=pid proc /proc && exec \"$0\" \"$@\"";
+    let mut command = Command::new("unshare");
+    command.args(["--mount", "--pid", "--fork", "sh", "-c", script, env!("CARGO_BIN_EXE_planish"), "run"]);
+    command.arg(crate::support::fixture("disk.stl")).arg("--out").arg(out.path());
+    let ran = command.output();
+    match ran {
+        Ok(ran) if ran.status.success() => assert_eq!(out.report("disk.stl").status, Status::Certified),
+        Ok(ran) if out.of("disk.stl").exists() => panic!("{ran:?}"),
+        _ => eprintln!("skipped: no file systems can be mounted here"),
+    }
+}
+
 #[test]
 fn one_death_is_an_accident() {
     let mut w = Watched::new(&["--jobs", "2"]);
@@ -114,9 +174,14 @@ fn limits_of_time_and_memory_are_those_of_single_inputs() {
         w.drop_in("small.stl", &small);
         w.start();
         w.wait_for(&[("large.stl", &large), ("small.stl", &small)]);
-        w.stop();
         w.assert_complete("small.stl", Status::Certified);
         assert_eq!(code(&w.out.report("large.stl")), Some(what), "{:?}", w.out.report("large.stl").reason);
+        // Who was ended for a limit has not died of anything, whatever becomes of the daemon.
+        w.kill();
+        w.start();
+        w.wait_until("it watches again", |w| w.log().matches("\"watches\"").count() == 2);
+        w.stop();
+        assert!(!w.log().contains("when the last planish died"), "{}", w.log());
         w.assert_tidy(&["large.stl", "small.stl"]);
     }
 }
@@ -161,7 +226,7 @@ fn results_do_not_depend_on_processes() {
 #[test]
 fn nobody_else_starts_such_a_process() {
     let w = Watched::new(&[]);
-    let ended = crate::support::planish(["job", "--name", "a", "--into", "b", "a.stl"].map(std::ffi::OsStr::new));
+    let ended = planish(["job", "--name", "a", "--into", "b", "a.stl"].map(std::ffi::OsStr::new));
     assert_eq!(ended.code, Some(2), "{}", ended.err);
     drop(w);
 }

@@ -105,6 +105,24 @@ fn an_output_folder_that_is_removed_ends_the_daemon() {
     assert!(w.log().contains("the output folder was removed"), "{}", w.log());
 }
 
+/// Nor does a command go on for whose result there is no place.
+#[test]
+fn commands_end_with_a_daemon_whose_output_folder_is_gone() {
+    let mut w = Watched::configured(
+        "[[on_certified]]\ncommand = [\"sh\", \"-c\", \"echo $$ > {input}.pid; exec sleep 1000\"]\n",
+        &[],
+    );
+    w.drop_in("a.stl", &disk(4, 0.0));
+    w.start();
+    let pid = w.inbox().join("a.stl.pid");
+    w.wait_until("the command runs", |w| w.status()["running"][0]["stage"] == "chain" && pid.exists());
+    let id = std::fs::read_to_string(&pid).expect("a number");
+    std::fs::remove_dir_all(w.out.path()).expect("removed");
+    assert_eq!(w.wait().code(), Some(2));
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", id.trim())).unwrap_or_default();
+    assert!(stat.is_empty() || stat.contains(") Z "), "it goes on: {stat}");
+}
+
 /// As under `nohup`: what was ignored when the daemon was started stays ignored.
 #[test]
 fn a_hangup_that_is_ignored_at_the_start_ends_nothing() {

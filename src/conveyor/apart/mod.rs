@@ -17,6 +17,7 @@ pub(super) mod stage;
 
 use super::budget::Account;
 use super::travel::Travel;
+use crate::begun;
 use crate::job::Stage;
 use crate::report::ResultSettings;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
@@ -100,10 +101,16 @@ pub(super) fn run(travel: &Travel, folder: &Path) -> io::Result<Outcome> {
         let has_told = matches!(followed, Ok((Some(_), _)));
         let status = if has_told { await_end(&child) } else { end(&child) };
         ended.store(true, Ordering::Relaxed);
+        // Before those who lend it more are waited for: they may wait for just that.
+        line.is_gone();
         let (ending, guard) = followed?;
         Ok((ending, guard.join().unwrap_or(None), status?))
     });
     line.give_all_back();
+    if let Some((mark, _)) = travel.mark_apart() {
+        // What it died of is counted here, and not once more when this process ends.
+        begun::end_apart(&mark);
+    }
     let (ending, ended_by_guard, status) = followed?;
     Ok(match (ended_by_guard, ending) {
         (Some(outcome), _) => outcome,
@@ -265,6 +272,8 @@ struct Line<'a> {
     to: Mutex<ChildStdin>,
     /// Memory that the child has, in bytes.
     memory: AtomicU64,
+    /// Whether the child has ended.
+    gone: AtomicBool,
 }
 
 /// What the child asks for, on its way to those who see to it. That they are dropped tells these that it has ended.
@@ -279,7 +288,7 @@ const REQUESTS: usize = 1 << 14;
 
 impl<'a> Line<'a> {
     fn new(travel: &'a Travel, to: ChildStdin) -> Self {
-        Self { travel, to: Mutex::new(to), memory: AtomicU64::new(0) }
+        Self { travel, to: Mutex::new(to), memory: AtomicU64::new(0), gone: AtomicBool::new(false) }
     }
 
     /// A child that listens no more has ended, and is found so.
@@ -314,27 +323,39 @@ impl<'a> Line<'a> {
     }
 
     fn lend_memory(&self, ticket: u64, bytes: u64) {
+        if self.gone.load(Ordering::SeqCst) {
+            return;
+        }
         self.travel.shared.grants.take(Account::Factor, bytes, self.travel.turn);
-        self.memory.fetch_add(bytes, Ordering::Relaxed);
+        self.memory.fetch_add(bytes, Ordering::SeqCst);
+        if self.gone.load(Ordering::SeqCst) {
+            return self.give_all_back();
+        }
         self.tell(&Told::Answer { ticket, granted: true });
     }
 
     fn try_to_lend_memory(&self, ticket: u64, bytes: u64) {
         let granted = self.travel.shared.grants.try_take(Account::Factor, bytes);
         if granted {
-            self.memory.fetch_add(bytes, Ordering::Relaxed);
+            self.memory.fetch_add(bytes, Ordering::SeqCst);
         }
         self.tell(&Told::Answer { ticket, granted });
     }
 
     fn take_memory_back(&self, bytes: u64) {
-        self.memory.fetch_sub(bytes, Ordering::Relaxed);
+        self.memory.fetch_sub(bytes, Ordering::SeqCst);
         self.travel.shared.grants.give_back(Account::Factor, bytes);
+    }
+
+    /// The child has ended: what it had is given back, and it gets no more.
+    fn is_gone(&self) {
+        self.gone.store(true, Ordering::SeqCst);
+        self.give_all_back();
     }
 
     /// What a child had when it ended.
     fn give_all_back(&self) {
-        let bytes = self.memory.swap(0, Ordering::Relaxed);
+        let bytes = self.memory.swap(0, Ordering::SeqCst);
         if bytes > 0 {
             self.travel.shared.grants.give_back(Account::Factor, bytes);
         }
@@ -342,17 +363,17 @@ impl<'a> Line<'a> {
 
     /// Does what the child says until it says no more; how its job has ended, if it told.
     fn follow(&self, stdout: impl Read, channels: &Channels) -> Option<Ending> {
-        let mut ending = None;
         for line in BufReader::new(stdout).lines() {
             let said = line.and_then(|line| Ok(serde_json::from_str(&line)?));
             match said {
-                Ok(Said::Ended(how)) => ending = Some(how),
+                // Its last word: who lingers after that is not waited for.
+                Ok(Said::Ended(how)) => return Some(how),
                 Ok(said) => self.take_in(said, channels),
                 // A line that was broken off: it is dying.
                 Err(_) => return None,
             }
         }
-        ending
+        None
     }
 
     fn take_in(&self, said: Said, channels: &Channels) {
@@ -363,7 +384,10 @@ impl<'a> Line<'a> {
             Said::TryTake { ticket, bytes } => self.try_to_lend_memory(ticket, bytes),
             Said::Take { ticket, bytes } => drop(channels.memory.send((ticket, bytes))),
             Said::GiveBack { bytes } => self.take_memory_back(bytes),
-            Said::Progress { stage, charts_done, charts } => self.travel.is_at(stage, charts_done, charts),
+            Said::Progress { stage, charts_done, charts, trouble } => {
+                self.travel.is_at(stage, charts_done, charts);
+                self.travel.is_in_trouble(trouble);
+            }
             Said::Beside { names } => self.travel.job.set_beside(names),
             Said::Ended(_) => {}
         }

@@ -87,6 +87,8 @@ pub enum Said {
         charts_done: usize,
         /// All its charts, as far as they are known.
         charts: usize,
+        /// What keeps it from going on.
+        trouble: Option<String>,
     },
     /// It asked for these files beside the input.
     Beside {
@@ -109,6 +111,13 @@ pub enum Ending {
     Waiting(Reason),
     /// The system gets in the way, and may not do so later.
     Again(Reason),
+    /// Its files cannot be written.
+    Unwritten {
+        /// What is wrong and what to do.
+        message: String,
+        /// Whether it stays as long as nobody changes something.
+        lasts: bool,
+    },
     /// A stage broke down.
     Lost,
 }

@@ -8,7 +8,8 @@ use crate::conveyor::writing::{self, After, Made, Ready};
 use crate::conveyor::{Finished, hand_on, reading, unwritten};
 use crate::job::{End, Stage};
 use crate::outcome::{Code, Reason};
-use crate::publish::Staged;
+use crate::passing;
+use crate::publish::{PublishError, Staged};
 use crate::report::{self, Report};
 use crate::stages;
 use blake3::Hash;
@@ -42,6 +43,8 @@ pub(in crate::conveyor) fn do_apart(
             Some(Tried::Died(death)) if travel.count_death() < MOST_DEATHS && travel.job.is_wanted() => {
                 let _in_stage = travel.in_stage(Stage::Read);
                 tracing::warn!("its process died ({death}): it is tried once more");
+                // Where the machine was short of something, it may have it then.
+                std::thread::sleep(passing::pause(1));
             }
             tried => break tried,
         }
@@ -85,6 +88,7 @@ fn end(travel: &Arc<Travel>, ending: Ending, staged: Staged, hash: Hash, after: 
         Ending::Changed => travel.end(End::Changed),
         Ending::Waiting(reason) => travel.end(End::Waiting(reason)),
         Ending::Again(reason) => reading::again(travel, reason),
+        Ending::Unwritten { message, lasts } => unwritten(travel, PublishError::Told { message, lasts }),
         Ending::Lost => travel.end(End::Lost),
     }
 }
