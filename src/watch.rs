@@ -234,7 +234,7 @@ impl Eyes {
                 },
                 Err(error) => {
                     let is_whole = error.depth() == 0;
-                    let error = io::Error::from(error);
+                    let error = of_the_system(error);
                     // Files may go at any moment; where the system is in trouble, nothing is known.
                     if is_whole || passing::passes(&error) {
                         return Err(error);
@@ -254,7 +254,7 @@ impl Eyes {
         }
         let kind = entry.file_type();
         let look = if kind.is_file() {
-            Some(Look::of(&entry.metadata()?))
+            Some(Look::of(&entry.metadata().map_err(of_the_system)?))
         } else if kind.is_symlink() && self.leads_inside(entry.path()) {
             Look::at(entry.path())?
         } else {
@@ -274,6 +274,11 @@ impl Eyes {
         let target = self.inbox.canonicalize().and_then(|inbox| Ok(link.canonicalize()?.starts_with(inbox)));
         target.unwrap_or(false)
     }
+}
+
+/// The error of the system itself: as it is wrapped, its number cannot be told.
+fn of_the_system(error: walkdir::Error) -> io::Error {
+    error.into_io_error().unwrap_or_else(|| io::Error::other("links lead in circles"))
 }
 
 /// What asks the system for hints, and passes each on as a bare sign that something happened.

@@ -167,7 +167,7 @@ fn health_is_an_exit_code_with_its_reasons() {
     w.start();
     w.wait_until("it tells", |w| w.status()["pid"] == w.pid());
     let (code, told) = health(&w, &[]);
-    assert_eq!((code, told.lines().filter(|line| line.starts_with("good ")).count()), (Some(0), 7), "{told}");
+    assert_eq!((code, told.lines().filter(|line| line.starts_with("good ")).count()), (Some(0), 8), "{told}");
     w.drop_in("waits.gltf", GLTF.as_bytes());
     w.wait_until("it waits", |w| w.status()["notable"][0]["state"] == "waits");
     assert_eq!(health(&w, &[]).0, Some(0));
