@@ -23,6 +23,7 @@ mod grants;
 pub mod queue;
 mod reading;
 mod surface;
+mod sync;
 mod travel;
 pub mod turnstile;
 mod writing;

@@ -18,4 +18,5 @@ mod names;
 mod opening;
 mod packaging;
 mod run;
+mod schedules;
 mod support;

@@ -8,7 +8,7 @@
 //! account are granted in the order of their turns.
 
 use super::queue::{BELTS, Turn};
-use parking_lot::{Condvar, Mutex};
+use super::sync::{Condvar, Mutex};
 use std::collections::BTreeSet;
 
 /// Who asks for memory.

@@ -5,7 +5,7 @@
 //! safe points a long computation lets those ahead of it pass.
 
 use super::queue::Turn;
-use parking_lot::{Condvar, Mutex, MutexGuard};
+use super::sync::{Condvar, Mutex, MutexGuard};
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
