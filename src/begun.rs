@@ -12,7 +12,7 @@
 //!
 //! Nothing here is brought to disk: marks are for deaths of processes, which the memory of the system survives.
 
-use crate::disk::{Disk, System};
+use crate::disk::{self, Disk, File as _, System};
 use crate::look::Look;
 use crate::own;
 use crate::publish::STAGING;
@@ -229,18 +229,14 @@ fn file(name: &Path) -> String {
 }
 
 fn read(path: &Path) -> Option<Entry> {
-    let file = regular::open_itself(path).ok()?;
-    serde_json::from_slice(&regular::read(&file, LONGEST).ok()?).ok()
+    regular::read_json(regular::open_itself(path), LONGEST)
 }
 
 /// Puts a record in its place at once.
 fn write(record: &Path, entry: &Entry) -> io::Result<()> {
-    let folder = record.parent().unwrap_or(record);
-    own::folder(&System, folder)?;
-    let fresh = tempfile::NamedTempFile::new_in(folder)?;
-    fs::write(fresh.path(), serde_json::to_vec(entry)?)?;
-    fresh.persist(record).map_err(|e| e.error)?;
-    Ok(())
+    let folder = own::folder(&System, record.parent().unwrap_or(record))?;
+    let told = serde_json::to_vec(entry)?;
+    disk::replace_with(&folder, &folder, record.file_name().unwrap_or_default(), |file| file.append(&told))
 }
 
 /// Removes a record, and the folder of records with the last one; whether it was there.

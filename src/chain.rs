@@ -10,9 +10,6 @@ use crate::put_away::{Fate, Processed, PutAwayError, Way, put_away};
 use crate::report::Report;
 use crate::settings::{Inputs, Settings};
 use blake3::Hash;
-use parking_lot::Mutex;
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Why what should follow did not.
@@ -35,9 +32,6 @@ const QUIET: Duration = Duration::from_secs(10);
 
 /// How often it is asked whether a job is still wanted, while it waits for its input to be quiet.
 const POLL: Duration = Duration::from_millis(50);
-
-/// Inputs that somebody had open for writing when they were to be put away, as was told.
-static BUSY: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// What became of what follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,22 +144,10 @@ fn done_with(
     // The input is all that the result could be made from again.
     publisher.secure(&job.name)?;
     Ok(match put_away(&System, &Processed { inbox, name: &job.name, look, hash }, way)? {
-        Fate::Busy => {
-            tell_once(&job.path);
-            Followed::Busy
-        }
-        ended => {
-            BUSY.lock().remove(&job.path);
-            if ended == Fate::Changed { Followed::Changed } else { Followed::Whole }
-        }
+        Fate::Busy => Followed::Busy,
+        Fate::Changed => Followed::Changed,
+        Fate::Away | Fate::Nothing => Followed::Whole,
     })
-}
-
-/// Tells that an input waits for somebody who writes to it, the first time.
-fn tell_once(path: &Path) {
-    if BUSY.lock().insert(path.to_owned()) {
-        tracing::info!("somebody has it open for writing: it is put away when it is closed");
-    }
 }
 
 /// Waits until `then`, as long as the job is wanted; whether it is.

@@ -31,7 +31,7 @@ mod writing;
 use crate::begun::Begun;
 use crate::chain::{self, Followed};
 use crate::job::{Done, End, Job, Stage, Stopped};
-use crate::outcome::{Code, Reason, Status};
+use crate::outcome::Status;
 use crate::publish::{PublishError, Publisher};
 use crate::report::Report;
 use crate::settings::Settings;
@@ -362,10 +362,7 @@ fn follow_up(Chained { travel, done }: Chained) {
         Ok(Followed::Whole) => End::Done(done),
         Ok(Followed::BrokenOff) => End::Unwanted,
         Ok(Followed::Until(then)) => End::Later(done, then),
-        Ok(Followed::Busy) => {
-            let message = "somebody has it open for writing: it is put away when it is closed";
-            End::Again(Reason::new(Code::Unreadable, message))
-        }
+        Ok(Followed::Busy) => End::Held(done, "somebody has it open for writing: it is put away when it is closed"),
         Ok(Followed::Changed) => {
             tracing::info!(
                 "changed since it was read, whether its size and times show it or not: it is processed again"

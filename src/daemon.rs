@@ -256,14 +256,10 @@ impl<'a> Daemon<'a> {
         match change {
             Change::Settled(name, look, since) => {
                 tracing::debug!(input = shown(&name), bytes = look.bytes, "settled");
-                let job = Arc::new(Job::of_inbox(self.eyes.inbox(), &name, look, since));
-                self.jobs.insert(name, job.clone());
-                self.conveyor.submit(job);
+                self.submit(Job::of_inbox(self.eyes.inbox(), &name, look, since));
             }
             Change::Doubted(name, look, hash) => {
-                let job = Arc::new(Job::of_inbox(self.eyes.inbox(), &name, look, Instant::now()).doubting(hash));
-                self.jobs.insert(name, job.clone());
-                self.conveyor.submit(job);
+                self.submit(Job::of_inbox(self.eyes.inbox(), &name, look, Instant::now()).doubting(hash));
             }
             Change::Withdrawn(name) => {
                 self.outdated.remove(&name);
@@ -273,6 +269,12 @@ impl<'a> Daemon<'a> {
                 }
             }
         }
+    }
+
+    fn submit(&mut self, job: Job) {
+        let job = Arc::new(job);
+        self.jobs.insert(job.name.clone(), job.clone());
+        self.conveyor.submit(job);
     }
 
     fn ended(&mut self, Ended { job, end }: Ended) {
@@ -312,14 +314,24 @@ impl<'a> Daemon<'a> {
             End::Later(_, then) => {
                 self.inbox.again(name, look, then, "it is put away when it has not changed for ten seconds");
             }
+            End::Held(_, why) => {
+                if self.inbox.failed(name, look, now, why) == 1 {
+                    let of_job = tracing::info_span!("job", input = shown(name));
+                    of_job.in_scope(|| tracing::info!("{why}"));
+                }
+            }
             // What it waits for is part of what is seen of it now.
             End::Waiting(reason) => {
                 tracing::info!(input = shown(name), "waits: {}", reason.message);
                 self.inbox.done(name, look, Rest::Waits(reason.message), None);
             }
             End::Changed | End::Outdated(_) => self.inbox.again(name, look, now + SOON, "it has changed"),
-            End::Again(reason) => self.inbox.failed(name, look, now, &reason.message),
-            End::Unwanted => self.inbox.failed(name, look, now, "its job was cancelled"),
+            End::Again(reason) => {
+                self.inbox.failed(name, look, now, &reason.message);
+            }
+            End::Unwanted => {
+                self.inbox.failed(name, look, now, "its job was cancelled");
+            }
             End::Unwritten(error) => {
                 self.status.last_error = Some(Trouble::now(&error));
                 if error.is_lasting() {

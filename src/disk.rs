@@ -34,6 +34,9 @@ pub const OPEN_FOLDER: u32 = 0o777;
 /// As [`OPEN_FOLDER`], of files.
 pub const OPEN_FILE: u32 = 0o666;
 
+/// How the names of files begin that are not complete: hidden, as the desk may be a folder of somebody else's.
+const FRESH: &str = ".planish-fresh-";
+
 /// Names that are tried to find a free one.
 const ATTEMPTS: u32 = 100;
 
@@ -319,14 +322,27 @@ pub fn make_unique_folder<F: Folder>(folder: &F, prefix: &str, mode: u32) -> io:
 ///
 /// # Errors
 /// Those of the system.
-pub fn replace_file<F: Folder>(desk: &F, folder: &F, name: &str, content: &[u8]) -> io::Result<()> {
-    let (fresh, file) = make_unique("fresh-", |fresh| desk.make_file(fresh, OPEN_FILE))?;
-    let written = file.append(content).and_then(|()| file.sync());
-    let placed = written.and_then(|()| desk.rename(&fresh, folder, name, Rename::Over));
+pub fn replace_file<F: Folder>(desk: &F, folder: &F, name: impl AsRef<OsStr>, content: &[u8]) -> io::Result<()> {
+    replace_with(desk, folder, name, |file| file.append(content).and_then(|()| file.sync()))?;
+    folder.sync()
+}
+
+/// As [`replace_file`], of a file that `write` writes to: nothing waits for the disk, unless that does.
+///
+/// # Errors
+/// Those of the system, and of `write`.
+pub fn replace_with<F: Folder>(
+    desk: &F,
+    folder: &F,
+    name: impl AsRef<OsStr>,
+    write: impl Fn(&F::File) -> io::Result<()>,
+) -> io::Result<()> {
+    let (fresh, file) = make_unique(FRESH, |fresh| desk.make_file(fresh, OPEN_FILE))?;
+    let placed = write(&file).and_then(|()| desk.rename(&fresh, folder, name, Rename::Over));
     if placed.is_err() {
         let _ = desk.unlink(&fresh);
     }
-    placed.and_then(|()| folder.sync())
+    placed
 }
 
 /// Moves a file or link to another folder, where its name must be free.

@@ -87,12 +87,27 @@ enum State {
     Done(Rest, Option<Doubt>),
 }
 
+/// The states of files that are not done with, or not as they should be, in a word.
+pub const STATES: [&str; 4] = [UNSETTLED, LATER, WAITS, ASIDE];
+
+/// It changes still.
+pub const UNSETTLED: &str = "unsettled";
+
+/// It is tried again later.
+const LATER: &str = "later";
+
+/// It waits for files beside it.
+const WAITS: &str = "waits";
+
+/// Its result cannot be put in its place.
+const ASIDE: &str = "aside";
+
 /// A file that is not done with, or not as it should be.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Notable<'a> {
     /// Its path below the inbox.
     pub name: &'a Path,
-    /// What it is about, in a word.
+    /// One of [`STATES`].
     pub state: &'static str,
     /// Why.
     pub reason: &'a str,
@@ -125,10 +140,10 @@ impl File {
 
     fn notable<'a>(&'a self, name: &'a Path) -> Option<Notable<'a>> {
         let (state, reason) = match &self.state {
-            State::Changing(_) => ("unsettled", "it changes still"),
-            State::Later(_, reason) => ("later", &reason[..]),
-            State::Done(Rest::Waits(reason), _) => ("waits", &reason[..]),
-            State::Done(Rest::Aside(reason), _) => ("aside", &reason[..]),
+            State::Changing(_) => (UNSETTLED, "it changes still"),
+            State::Later(_, reason) => (LATER, &reason[..]),
+            State::Done(Rest::Waits(reason), _) => (WAITS, &reason[..]),
+            State::Done(Rest::Aside(reason), _) => (ASIDE, &reason[..]),
             State::Submitted | State::Done(Rest::Published | Rest::Delivered, _) => return None,
         };
         Some(Notable { name, state, reason, since: self.restless })
@@ -179,12 +194,12 @@ impl Inbox {
     }
 
     /// The job for this state of a file could not be done, for a reason that passes: it is done again, the later, the more
-    /// often that happened.
-    pub fn failed(&mut self, name: &Path, look: &Look, now: Instant, why: &str) {
-        if let Some(file) = self.submitted(name, look) {
-            file.failures = file.failures.saturating_add(1);
-            file.state = State::Later(now + passing::pause(file.failures), why.to_owned());
-        }
+    /// often that happened in a row; how often that was.
+    pub fn failed(&mut self, name: &Path, look: &Look, now: Instant, why: &str) -> u32 {
+        let Some(file) = self.submitted(name, look) else { return 0 };
+        file.failures = file.failures.saturating_add(1);
+        file.state = State::Later(now + passing::pause(file.failures), why.to_owned());
+        file.failures
     }
 
     fn submitted(&mut self, name: &Path, look: &Look) -> Option<&mut File> {
@@ -219,11 +234,6 @@ impl Inbox {
     /// When something is to be done next, if nothing changes.
     pub fn due(&self) -> Option<Instant> {
         self.files.values().filter_map(File::due).min()
-    }
-
-    /// How many files have not settled yet.
-    pub fn unsettled(&self) -> usize {
-        self.files.values().filter(|file| matches!(file.state, State::Changing(_))).count()
     }
 
     /// The files that are not done with and no jobs, and those that are not as they should be, in the order of names.
@@ -311,7 +321,7 @@ mod tests {
         inbox.done(Path::new("a.stl"), &old[Path::new("a.stl")].look, Rest::Published, None);
         assert_eq!(settled(&inbox.look(&new, start + 3 * SETTLE)), ["a.stl"]);
         assert_eq!(inbox.look(&Listing::new(), start + 4 * SETTLE), withdrawn);
-        assert_eq!(inbox.unsettled(), 0);
+        assert_eq!(inbox.notable().count(), 0);
         inbox.look(&new, start + 5 * SETTLE);
         assert_eq!(settled(&inbox.look(&new, start + 6 * SETTLE)), ["a.stl"], "it came back");
     }

@@ -96,6 +96,8 @@ pub enum End {
     Done(Done),
     /// Its result stands, but its input is to be put away, and it is too early for that: not before then.
     Later(Done, Instant),
+    /// Its result stands, but its input is not put away, for this reason, which passes.
+    Held(Done, &'static str),
     /// Its result stands, but when its input was to be put away, that was something else: it is to be processed again.
     Outdated(Done),
     /// It was doubted, and is what it was.
@@ -123,7 +125,7 @@ impl End {
     /// The result that stands, or has stood, whatever became of what should follow it.
     pub fn standing(&self) -> Option<&Done> {
         match self {
-            Self::Done(done) | Self::Later(done, _) | Self::Outdated(done) => Some(done),
+            Self::Done(done) | Self::Later(done, _) | Self::Held(done, _) | Self::Outdated(done) => Some(done),
             Self::Taken(done, _) | Self::Unchained(done, _) => Some(done),
             Self::Same
             | Self::Unwanted

@@ -3,11 +3,10 @@
 //! The file is always whole: it is written beside its place and renamed. Anybody may read it, as the collector runs as
 //! another user; no name of an input is in it.
 
+use crate::disk::{self, Disk, File as _, System};
 use crate::status::{Counts, Status};
 use prometheus::{CounterVec, GaugeVec, Opts, Registry, TextEncoder};
-use std::fs::{self, Permissions};
-use std::io::{self, Write};
-use std::os::unix::fs::PermissionsExt;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -16,6 +15,9 @@ const PERIOD: Duration = Duration::from_secs(15);
 
 /// And at most so often, where inputs end one after another.
 const REST: Duration = Duration::from_secs(1);
+
+/// Everybody may read it, whatever the user's mask says.
+const FOR_ALL: u32 = 0o644;
 
 /// What is not in the status.
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,11 +72,9 @@ impl Metrics {
 /// Puts the file in its place at once.
 fn put(path: &Path, text: &[u8]) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut fresh = tempfile::Builder::new().prefix(".planish-metrics-").tempfile_in(folder)?;
-    fresh.write_all(text)?;
-    fs::set_permissions(fresh.path(), Permissions::from_mode(0o644))?;
-    fresh.persist(path).map_err(|error| error.error)?;
-    Ok(())
+    let folder = System.open(folder)?;
+    let name = path.file_name().unwrap_or_default();
+    disk::replace_with(&folder, &folder, name, |file| file.append(text).and_then(|()| file.set_mode(FOR_ALL)))
 }
 
 /// Whether what is counted only grows.
@@ -168,6 +168,8 @@ fn inputs(page: &Page, status: &Status) -> prometheus::Result<()> {
 mod tests {
     use super::*;
     use crate::status::Trouble;
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
 
     /// A value by the name of its metric, labels included.
     fn value(text: &str, name: &str) -> Option<f64> {

@@ -6,8 +6,10 @@
 
 use crate::disk::{self, Disk, System};
 use crate::shown::shown;
+use blake3::{Hash, Hasher};
 use rustix::fd::{AsFd, OwnedFd};
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, openat, statat};
+use serde::de::DeserializeOwned;
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{self, Read};
@@ -143,6 +145,23 @@ pub fn read(file: &impl disk::File, most: u64) -> Result<Vec<u8>, OpenError> {
     Ok(bytes)
 }
 
+/// What a JSON file of at most `most` bytes says; none where it is not opened, or says something else.
+pub fn read_json<T: DeserializeOwned>(file: Result<impl disk::File, OpenError>, most: u64) -> Option<T> {
+    serde_json::from_slice(&read(&file.ok()?, most).ok()?).ok()
+}
+
+/// The hash of a file of at most `most` bytes, and how many these are; as [`read`], but nothing is kept.
+///
+/// # Errors
+/// As [`read`].
+pub fn hash(file: &impl disk::File, most: u64) -> Result<(Hash, u64), OpenError> {
+    refuse_large(file.stat()?.bytes, most)?;
+    let mut hasher = Hasher::new();
+    hasher.update_reader(file.content()?.take(most.saturating_add(1)))?;
+    refuse_large(hasher.count(), most)?;
+    Ok((hasher.finalize(), hasher.count()))
+}
+
 /// As [`read`], in the place of what `bytes` hold: memory that is there is used again.
 ///
 /// # Errors
@@ -150,12 +169,13 @@ pub fn read(file: &impl disk::File, most: u64) -> Result<Vec<u8>, OpenError> {
 pub fn read_into(file: &impl disk::File, most: u64, bytes: &mut Vec<u8>) -> Result<(), OpenError> {
     bytes.clear();
     let size = file.stat()?.bytes;
-    if size > most {
-        return Err(OpenError::TooLarge { size, most });
-    }
+    refuse_large(size, most)?;
     bytes.try_reserve_exact(usize::try_from(size).unwrap_or(usize::MAX)).map_err(io::Error::other)?;
     file.content()?.take(most.saturating_add(1)).read_to_end(bytes)?;
-    let size = bytes.len() as u64;
+    refuse_large(bytes.len() as u64, most)
+}
+
+fn refuse_large(size: u64, most: u64) -> Result<(), OpenError> {
     if size > most { Err(OpenError::TooLarge { size, most }) } else { Ok(()) }
 }
 

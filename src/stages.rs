@@ -22,7 +22,6 @@ use pipeline::{
 };
 use std::cell::RefCell;
 use std::fs::File;
-use std::io::Read;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -74,18 +73,7 @@ pub fn read_input(job: &Job, settings: &Settings) -> Result<Vec<u8>, Unread> {
 /// # Errors
 /// Why not.
 pub fn hash_input(job: &Job, settings: &Settings) -> Result<(blake3::Hash, u64), Unread> {
-    let (file, most) = (open_input(job)?, settings.limits.file);
-    let size = file.metadata().map_err(OpenError::Io)?.len();
-    if size > most {
-        return Err(OpenError::TooLarge { size, most }.into());
-    }
-    let mut hasher = blake3::Hasher::new();
-    let read = hasher.update_reader(file.take(most.saturating_add(1))).map_err(OpenError::Io);
-    let size = read?.count();
-    if size > most {
-        return Err(OpenError::TooLarge { size, most }.into());
-    }
-    Ok((hasher.finalize(), size))
+    Ok(regular::hash(&open_input(job)?, settings.limits.file)?)
 }
 
 fn open_input(job: &Job) -> Result<File, Unread> {

@@ -4,7 +4,7 @@
 //! told by its lock on `OUT/.planish/watch.lock`, which the system takes back even where the daemon was killed.
 
 use crate::conveyor::board::Running;
-use crate::disk::{self, Disk, File as _, Folder, OPEN_FILE, Rename, System};
+use crate::disk::{self, Disk, File as _, System};
 use crate::inbox::Notable;
 use crate::look::Identity;
 use crate::outcome::{Code, Status as Outcome};
@@ -288,14 +288,17 @@ impl Lock {
     /// Whether the lock is still that of the output folder: somebody may have removed or replaced either. Where only the
     /// lock is gone, it is taken again.
     pub fn hold(&mut self) -> Held {
-        let there = fs::metadata(self.path()).map(|m| Identity::of(&m));
-        let held = self.lock.metadata().map(|m| Identity::of(&m));
-        match (there, held) {
-            (Ok(there), Ok(held)) if there == held => Held::Yes,
-            (Ok(_), Ok(_)) => self.take_again(),
-            (Err(error), _) if is_gone(&error) => self.take_again(),
-            (Err(error), _) | (_, Err(error)) => Held::Unknown(error),
+        match self.is_there() {
+            Ok(true) => Held::Yes,
+            Ok(false) => self.take_again(),
+            Err(error) if is_gone(&error) => self.take_again(),
+            Err(error) => Held::Unknown(error),
         }
+    }
+
+    /// Whether the lock is the one that lies in the output folder.
+    fn is_there(&self) -> io::Result<bool> {
+        Ok(Identity::of(&fs::metadata(self.path())?) == Identity::of(&self.lock.metadata()?))
     }
 
     fn take_again(&mut self) -> Held {
@@ -327,25 +330,16 @@ impl Lock {
     /// # Errors
     /// Where the file cannot be written.
     pub fn tell(&self, status: &Status, staging: &Path) -> io::Result<()> {
-        let staging = System.open(staging)?;
-        // Whoever may read the results may read this: a temporary file would be its owner's alone. It is made anew each time,
-        // so that nothing is followed that somebody else put there. It need not survive the machine.
-        let (fresh, file) = disk::make_unique("status-", |fresh| staging.make_file(fresh, OPEN_FILE))?;
-        file.append(&serde_json::to_vec(status)?)?;
-        let root = System.open(&self.out.join(STAGING))?;
-        let placed = staging.rename(&fresh, &root, STATUS, Rename::Over);
-        if placed.is_err() {
-            let _ = staging.unlink(&fresh);
-        }
-        placed
+        let (desk, root) = (System.open(staging)?, System.open(&self.out.join(STAGING))?);
+        let told = serde_json::to_vec(status)?;
+        disk::replace_with(&desk, &root, STATUS, |file| file.append(&told))
     }
 }
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        let there = fs::metadata(self.path()).map(|m| Identity::of(&m));
-        let is_ours = there.is_ok_and(|there| self.lock.metadata().is_ok_and(|held| Identity::of(&held) == there));
-        if is_ours {
+        // Else the status is that of another daemon.
+        if self.is_there().is_ok_and(|is_there| is_there) {
             // It may never have been written.
             let _ = fs::remove_file(self.status());
         }
@@ -366,8 +360,7 @@ fn is_gone(error: &io::Error) -> bool {
 
 /// What the last daemon told; none: it ended in order, or there never was one.
 pub fn told(out: &Path) -> Option<Status> {
-    let file = regular::open_itself(&out.join(STAGING).join(STATUS)).ok()?;
-    serde_json::from_slice(&regular::read(&file, LONGEST).ok()?).ok()
+    regular::read_json(regular::open_itself(&out.join(STAGING).join(STATUS)), LONGEST)
 }
 
 /// Whether a daemon runs. Who may not read its lock (that of another user) goes by the process that it named.

@@ -2,7 +2,7 @@
 
 use crate::support::{Out, fixture, root};
 use planish::settings::{Said, Settings};
-use std::process::Command;
+use std::process::{Command, Output};
 
 fn packaged(name: &str) -> String {
     std::fs::read_to_string(root().join("packaging").join(name)).expect("committed")
@@ -63,18 +63,30 @@ fn the_example_works_as_it_is_and_switched_on_and_shows_the_defaults() {
     assert_eq!(ended.code, Some(0), "{}", ended.err);
 }
 
+/// Whether there is a program that judges units; it is said where there is none.
+fn can_analyze() -> bool {
+    let is_there = Command::new("systemd-analyze").arg("--version").output().is_ok();
+    if !is_there {
+        eprintln!("skipped: no systemd-analyze (apt-get install systemd)");
+    }
+    is_there
+}
+
+/// What systemd-analyze says of a unit with this text.
+fn analyze(unit: &str, args: &[&str]) -> Output {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("planish.service");
+    std::fs::write(&path, unit).expect("written");
+    Command::new("systemd-analyze").args(args).arg(path).output().expect("runs")
+}
+
 #[test]
 fn systemd_has_nothing_against_the_unit() {
-    if Command::new("systemd-analyze").arg("--version").output().is_err() {
-        eprintln!("skipped: no systemd-analyze (apt-get install systemd)");
+    if !can_analyze() {
         return;
     }
     let verify = |unit: &str| {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("planish.service");
-        std::fs::write(&path, unit).expect("written");
-        let mut command = Command::new("systemd-analyze");
-        let output = command.args(["verify", "--man=no", "--recursive-errors=no"]).arg(path).output().expect("runs");
+        let output = analyze(unit, &["verify", "--man=no", "--recursive-errors=no"]);
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         let about_it: Vec<&str> = told.lines().filter(|l| l.contains("planish")).collect();
         (output.status.success(), about_it.join("\n"))
@@ -104,18 +116,12 @@ fn without_steps(unit: &str) -> String {
 /// 0 is a service that can do nothing, 10 one that can do all.
 #[test]
 fn the_unit_lets_the_service_do_little() {
-    if Command::new("systemd-analyze").arg("--version").output().is_err() {
-        eprintln!("skipped: no systemd-analyze (apt-get install systemd)");
+    if !can_analyze() {
         return;
     }
     // Whether the exposure is 1.0 at the most.
     let is_little = |unit: &str| {
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("planish.service");
-        std::fs::write(&path, unit).expect("written");
-        let mut command = Command::new("systemd-analyze");
-        command.args(["security", "--offline=true", "--no-pager", "--threshold=10"]).arg(path);
-        let output = command.output().expect("runs");
+        let output = analyze(unit, &["security", "--offline=true", "--no-pager", "--threshold=10"]);
         let told = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(told.contains("Overall exposure level"), "{told}{}", String::from_utf8_lossy(&output.stderr));
         output.status.success()

@@ -11,10 +11,10 @@ use crate::job::{End, Job, Stage, Stopped};
 use crate::settings::Settings;
 use crate::shown::shown;
 use crate::stages::{self, guard};
+use crate::vitals;
 use crossbeam_channel::Sender;
 use parking_lot::{Mutex, RwLock};
 use pipeline::host::Host;
-use rustix::time::{ClockId, clock_gettime};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -152,9 +152,10 @@ impl Travel {
         self.reached(stage);
         let seat = Seat::take(self);
         let _in_stage = self.in_stage(stage);
-        let started = cpu_seconds();
+        let started = vitals::processor_of_this_thread();
         let result = if self.job.is_wanted() { guard(|| work(&seat)) } else { Err(Stopped::Unwanted) };
-        *self.seconds.lock().entry(stage.name()).or_insert(0.0) += cpu_seconds() - started;
+        *self.seconds.lock().entry(stage.name()).or_insert(0.0) +=
+            (vitals::processor_of_this_thread() - started).as_secs_f64();
         if self.job.is_wanted() { result } else { Err(Stopped::Unwanted) }
     }
 
@@ -262,12 +263,6 @@ impl Host for Seat<'_> {
     fn release(&self, bytes: u64) {
         self.0.shared.grants.give_back(Account::Factor, bytes);
     }
-}
-
-/// Processor seconds of this thread.
-fn cpu_seconds() -> f64 {
-    let t = clock_gettime(ClockId::ThreadCPUTime);
-    t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
 }
 
 #[cfg(test)]

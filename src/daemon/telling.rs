@@ -3,16 +3,13 @@
 use super::{ALIVE, Daemon, Phase, TELL};
 use crate::conveyor::Conveyor;
 use crate::conveyor::board::Running;
-use crate::inbox::Notable;
+use crate::inbox::{Notable, STATES, UNSETTLED};
 use crate::job::Stage;
 use crate::metrics::More;
 use crate::pulse::Vitals;
 use crate::status::{self, NAMED, Noted, Progress, Trouble};
 use crate::{conveyor, logging, room, vitals};
 use std::time::Instant;
-
-/// The states of notable inputs, so that each is counted even where there is none.
-const STATES: [&str; 4] = ["unsettled", "later", "waits", "aside"];
 
 impl Daemon<'_> {
     /// Tells everybody who is to hear something now.
@@ -97,12 +94,13 @@ impl Daemon<'_> {
         if let Some(trouble) = troubles.min().filter(|t| status.last_error.as_ref().is_none_or(|e| e.message != **t)) {
             status.last_error = Some(Trouble::now(trouble));
         }
-        status.unsettled = self.inbox.unsettled();
-        status.notables = self.inbox.notable().count();
         status.notable = self.inbox.notable().take(NAMED).map(Noted::from).collect();
+        // Each is counted even where there is none.
         status.notable_states = STATES.map(|state| (state.to_owned(), 0)).into();
         let count = |Notable { state, .. }| *status.notable_states.entry(state.to_owned()).or_default() += 1;
         self.inbox.notable().for_each(count);
+        status.notables = status.notable_states.values().sum();
+        status.unsettled = status.notable_states[UNSETTLED];
         status.oldest = self.inbox.oldest().map(|since| status::tenths(since.elapsed()));
         status.told = status::now();
         status.min_free = Some(self.settings.min_free);

@@ -5,6 +5,7 @@
 
 use super::check::{folder, read_report};
 use super::{Exit, complain, say, say_json, shown};
+use crate::disk::{self, Disk, System};
 use crate::formats::gmsh;
 use crate::formats::vtu::{self, Shape};
 use crate::formats::{self, Kind, Nothing, Patches, READ, Source};
@@ -14,7 +15,6 @@ use crate::report::{Output, Report};
 use crate::settings::Settings;
 use crate::stages::{guard, read_file_into};
 use pipeline::soundness::{self, HandedOverAtlas, Mesh, Triangulation};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What is asked of a mesh.
@@ -188,11 +188,8 @@ fn mesh(patches: &Patches) -> Mesh {
 fn keep(folder: &Path, report: &MeshReport) -> std::io::Result<()> {
     let mut text = serde_json::to_string_pretty(report)?;
     text.push('\n');
-    let mut file = tempfile::Builder::new().prefix(".mesh.json-").tempfile_in(folder)?;
-    file.write_all(text.as_bytes())?;
-    file.as_file().sync_all()?;
-    file.persist(folder.join(FILE)).map_err(|e| e.error)?;
-    Ok(())
+    let folder = System.open(folder)?;
+    disk::replace_file(&folder, &folder, FILE, text.as_bytes())
 }
 
 /// What was found, for people.

@@ -52,7 +52,6 @@ fn start(asked: &Apart, settings: Settings) -> io::Result<()> {
     conveyor.submit(job.clone());
     conveyor.close();
     let ended = follow(&conveyor, &parent);
-    asked.mark.iter().for_each(|mark| begun::end_apart(mark));
     parent.say(&Said::Beside { names: job.beside() });
     parent.say(&Said::Ended(ending(ended)));
     Ok(())
@@ -101,7 +100,9 @@ fn follow(conveyor: &Conveyor, parent: &Parent) -> End {
 
 fn ending(end: End) -> Ending {
     match end {
-        End::Done(_) | End::Later(..) | End::Outdated(_) | End::Taken(..) | End::Unchained(..) => Ending::Made,
+        End::Done(_) | End::Later(..) | End::Held(..) | End::Outdated(_) | End::Taken(..) | End::Unchained(..) => {
+            Ending::Made
+        }
         End::Changed | End::Unwanted | End::Same => Ending::Changed,
         End::Waiting(reason) => Ending::Waiting(reason),
         End::Again(reason) => Ending::Again(reason),

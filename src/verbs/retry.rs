@@ -80,6 +80,5 @@ fn remove(out: &Path, name: &Path) -> Result<(), Refused> {
 
 /// What the report of a result says.
 fn entry(out: &Path, name: &Path) -> Option<Entry> {
-    let file = regular::open_below(out, &name.join(report::FILE)).ok()?;
-    serde_json::from_slice(&regular::read(&file, LONGEST).ok()?).ok()
+    regular::read_json(regular::open_below(out, &name.join(report::FILE)), LONGEST)
 }

@@ -38,7 +38,8 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     conveyor.close();
     let ends = follow(&jobs, &conveyor, &stop, settings.quiet);
     // Where it was told twice to stop.
-    if let Ok(staging) = publisher.staging() {
+    let has_commands = !settings.on_certified.is_empty() || !settings.on_refused.is_empty();
+    if has_commands && let Ok(staging) = publisher.staging() {
         hooks::end_those_of(&staging);
     }
     publisher.close();
@@ -165,7 +166,7 @@ fn tell_trouble(job: &Job, end: &End) {
             let place = untold.map_or(String::new(), |place| format!(" ({place})"));
             complain(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
         }
-        End::Done(_) | End::Later(..) | End::Outdated(_) | End::Unwanted | End::Same => {}
+        End::Done(_) | End::Later(..) | End::Held(..) | End::Outdated(_) | End::Unwanted | End::Same => {}
     }
 }
 

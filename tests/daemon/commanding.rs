@@ -2,7 +2,7 @@
 
 use super::chaining::account;
 use super::putting_away::{NOBODY, can_be_nobody, open_for_nobody};
-use super::{Watched, disk, names};
+use super::{Watched, disk, names, runs};
 use crate::support::Out;
 use rustix::process::{Pid, Signal, geteuid, kill_process};
 use std::fs;
@@ -123,10 +123,11 @@ const EXCLUSIVE: &str = "
     sleep 600 &
     wait";
 
-/// Whether a process runs.
-fn runs(id: &str) -> bool {
-    let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
-    !stat.is_empty() && !stat.contains(") Z ")
+/// Waits until a command runs that writes its number to `begun`; that number.
+fn begun(w: &Watched) -> String {
+    let begun = w.out.of("a.stl").join("begun");
+    w.wait_until("the command runs", |_| fs::read_to_string(&begun).is_ok_and(|id| !id.is_empty()));
+    fs::read_to_string(&begun).expect("written").trim().to_owned()
 }
 
 #[test]
@@ -193,12 +194,11 @@ fn a_stubborn_command_does_not_outlive_a_daemon_that_is_told_twice_to_stop() {
     let mut w = Watched::configured(&stubborn, &[]);
     w.drop_in("a.stl", &disk(4, 0.0));
     w.start();
-    let begun = w.out.of("a.stl").join("begun");
-    w.wait_until("the command runs", |_| fs::read_to_string(&begun).is_ok_and(|id| !id.is_empty()));
+    let command = begun(&w);
     w.signal(Signal::TERM);
     std::thread::sleep(Duration::from_millis(300));
     w.stop();
-    assert!(!runs(fs::read_to_string(&begun).expect("written").trim()), "{}", w.log());
+    assert!(!runs(&command), "{}", w.log());
     w.assert_tidy(&["a.stl"]);
 }
 
@@ -209,10 +209,9 @@ fn commands_of_another_process_that_lives_are_left_alone() {
     let mut w = Watched::configured(&waits, &[]);
     w.drop_in("a.stl", &disk(4, 0.0));
     w.start();
-    let begun = w.out.of("a.stl").join("begun");
-    w.wait_until("the command runs", |_| fs::read_to_string(&begun).is_ok_and(|id| !id.is_empty()));
+    let command = begun(&w);
     w.out.try_bytes("b.stl", &disk(4, 1.0), &[]);
-    assert!(runs(fs::read_to_string(&begun).expect("written").trim()));
+    assert!(runs(&command));
     fs::write(w.out.of("a.stl").join("go"), "").expect("written");
     w.wait_until("it has ended", |w| account(w, "a.stl").is_some());
     assert_eq!(account(&w, "a.stl").expect("there")["commands"][0]["outcome"], "succeeded");

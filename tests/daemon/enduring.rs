@@ -1,18 +1,10 @@
 //! What gets in the way for a while, what somebody else does to the output folder, and what is told of all that.
 
-use super::{Watched, disk};
+use super::{Watched, disk, gltf_naming, limit_handles};
 use planish::outcome::Status;
-use rustix::process::{Pid, Resource, Rlimit, prlimit};
 use serde_json::Value;
 use std::fs;
 use std::time::Duration;
-
-/// Gives the daemon this many handles at most; it keeps those that it has.
-fn limit_handles(w: &Watched, handles: u64) -> Rlimit {
-    let pid = i32::try_from(w.pid()).ok().and_then(Pid::from_raw).expect("a process");
-    let limit = Rlimit { current: Some(handles), maximum: Some(1 << 10) };
-    prlimit(Some(pid), Resource::Nofile, limit).expect("set")
-}
 
 /// The number of the next handle that the daemon gets, when it does nothing else.
 fn lowest_free_handle(w: &Watched) -> u64 {
@@ -43,13 +35,13 @@ fn a_lack_of_handles_refuses_nothing_and_what_is_computed_is_not_computed_again(
     w.drop_in("first.stl", &first);
     w.wait_until("it is on its way", |w| w.logged("first.stl", "begins") == 1);
     std::thread::sleep(Duration::from_millis(50));
-    limit_handles(&w, 3);
+    limit_handles(w.pid(), 3);
     w.wait_until("its result cannot be written", |w| w.logged("first.stl", "the result is kept") == 1);
     // The inbox cannot be seen, either; once it can be, for a moment, this one cannot be opened.
     w.drop_in("second.stl", &second);
     std::thread::sleep(Duration::from_secs(3));
     assert!(!w.out.of("first.stl").exists());
-    limit_handles(&w, 1 << 10);
+    limit_handles(w.pid(), 1 << 10);
     w.wait_for(&[("first.stl", &first), ("second.stl", &second)]);
     w.stop();
     assert_eq!(w.logged("first.stl", "begins"), 1, "{}", w.log());
@@ -65,12 +57,12 @@ fn what_cannot_be_opened_now_is_read_later() {
     w.start();
     w.wait_until("it tells", |w| w.status()["pid"] == w.pid());
     // Enough to look at the inbox, which takes one more, but not to open a file in the folder that was opened.
-    limit_handles(&w, lowest_free_handle(&w) + 1);
+    limit_handles(w.pid(), lowest_free_handle(&w) + 1);
     w.drop_in("a.stl", &bytes);
     // The status has no room for its handles, either.
     w.wait_until("it is tried again", |w| w.logged("a.stl", "cannot read the file: Too many open files") > 0);
     assert!(!w.out.of("a.stl").exists());
-    limit_handles(&w, 1 << 10);
+    limit_handles(w.pid(), 1 << 10);
     w.wait_for(&[("a.stl", &bytes)]);
     w.stop();
     w.assert_complete("a.stl", Status::Certified);
@@ -86,10 +78,10 @@ fn a_folder_that_cannot_be_read_now_cancels_nothing() {
     w.start();
     w.wait_until("it is on its way", |w| w.is_running("sub/a.stl"));
     // Enough for the inbox, but not for what is in it.
-    limit_handles(&w, lowest_free_handle(&w) + 1);
+    limit_handles(w.pid(), lowest_free_handle(&w) + 1);
     fs::write(w.inbox().join("hint.stl~"), "").expect("written");
     std::thread::sleep(Duration::from_secs(2));
-    limit_handles(&w, 1 << 10);
+    limit_handles(w.pid(), 1 << 10);
     w.wait_for(&[("sub/a.stl", &bytes)]);
     w.stop();
     assert_eq!(w.logged("sub/a.stl", "begins"), 1, "{}", w.log());
@@ -159,11 +151,7 @@ fn every_input_that_is_not_done_is_named_with_its_reason() {
     let mut w = Watched::new(&[]);
     fs::create_dir(w.out.of("foreign.stl")).expect("made");
     fs::write(w.out.of("foreign.stl").join("work.txt"), "work").expect("written");
-    let gltf = r#"{"asset":{"version":"2.0"},"buffers":[{"byteLength":36,"uri":"data.bin"}],
-        "bufferViews":[{"buffer":0,"byteLength":36}],
-        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
-        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}]}"#;
-    w.drop_in("waits.gltf", gltf.as_bytes());
+    w.drop_in("waits.gltf", gltf_naming("data.bin").as_bytes());
     w.drop_in("foreign.stl", &disk(4, 0.0));
     w.start();
     w.wait_until("it waits for its data", |w| is_notable(w, "waits.gltf", "waits", "data.bin"));

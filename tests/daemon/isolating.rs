@@ -1,16 +1,16 @@
 //! What an input takes or dies of is its own affair.
 
-use super::{PATIENCE, Watched, disk};
+use super::{PATIENCE, Watched, disk, limit_handles, runs};
 use crate::support::{Out, planish};
 use planish::outcome::{Code, Status};
 use planish::report::Report;
-use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
+use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
 use std::process::Command;
 use std::time::Instant;
 
 /// The processes that another one has started: of planish, one for each large input.
-pub fn children(of: u32) -> Vec<i32> {
+pub fn children(of: u32) -> Vec<u32> {
     let tasks = fs::read_dir(format!("/proc/{of}/task")).into_iter().flatten().flatten();
     let read = |task: fs::DirEntry| fs::read_to_string(task.path().join("children")).unwrap_or_default();
     tasks
@@ -20,11 +20,11 @@ pub fn children(of: u32) -> Vec<i32> {
 }
 
 /// Kills the process of the large input.
-pub fn kill_child(w: &Watched, not: Option<i32>) -> i32 {
+pub fn kill_child(w: &Watched, not: Option<u32>) -> u32 {
     let since = Instant::now();
     loop {
         if let Some(child) = children(w.pid()).into_iter().find(|child| Some(*child) != not) {
-            kill_process(Pid::from_raw(child).expect("not 0"), Signal::KILL).expect("it lives");
+            kill_process(Pid::from_raw(child as i32).expect("not 0"), Signal::KILL).expect("it lives");
             return child;
         }
         assert!(since.elapsed() < PATIENCE, "no process was started\n{}", w.log());
@@ -94,15 +94,14 @@ fn what_the_process_of_an_input_cannot_write_is_not_computed_again() {
     w.start();
     w.wait_until("it has a process", |w| !children(w.pid()).is_empty());
     w.wait_until("it is computed", |w| w.is_running("large.stl"));
-    let child = Pid::from_raw(children(w.pid())[0]).expect("not 0");
-    let handles = |most| Rlimit { current: Some(most), maximum: Some(1 << 10) };
-    prlimit(Some(child), Resource::Nofile, handles(3)).expect("set");
+    let child = children(w.pid())[0];
+    limit_handles(child, 3);
     let is_held_up = |w: &Watched| w.status()["running"][0]["trouble"].as_str().is_some();
     w.wait_until("its result cannot be written", is_held_up);
     let health = || planish(["status".as_ref(), "--health".as_ref(), "--out".as_ref(), w.out.path().as_os_str()]);
     let told = health();
     assert!(told.code == Some(1) && told.out.contains("held up"), "{}", told.out);
-    prlimit(Some(child), Resource::Nofile, handles(1 << 10)).expect("set");
+    limit_handles(child, 1 << 10);
     w.wait_for(&[("large.stl", &large)]);
     assert_eq!(w.logged("large.stl", "begins"), 1, "{}", w.log());
     w.stop();
@@ -149,8 +148,7 @@ fn processes_of_inputs_end_with_the_daemon() {
         w.wait_until("it is on its way", |w| !children(w.pid()).is_empty());
         let orphans = children(w.pid());
         w.kill();
-        let lives = |id: &i32| fs::read_to_string(format!("/proc/{id}/stat")).is_ok_and(|stat| !stat.contains(") Z "));
-        w.wait_until("the process of the input has ended", |_| !orphans.iter().any(lives));
+        w.wait_until("the process of the input has ended", |_| !orphans.iter().any(runs));
     }
     w.start();
     w.wait_for(&[("large.stl", &large)]);

@@ -16,7 +16,7 @@ mod stopping;
 use crate::support::Out;
 use planish::outcome::Status;
 use planish::report::Output;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
@@ -261,6 +261,30 @@ pub fn disk(n: u32, twist: f64) -> Vec<u8> {
         bytes.extend([0; 2]);
     }
     bytes
+}
+
+/// A triangle in glTF, whose data are in the file that is named.
+pub fn gltf_naming(uri: &str) -> String {
+    format!(
+        r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"uri": "{uri}", "byteLength": 36}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                        "min": [0, 0, 0], "max": [1, 1, 0]}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}]}}"#
+    )
+}
+
+/// Whether a process runs: one that is dead, and of which nobody has asked, does not.
+pub fn runs(id: impl std::fmt::Display) -> bool {
+    let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
+    !stat.is_empty() && !stat.contains(") Z ")
+}
+
+/// Gives a process this many handles at most; it keeps those that it has.
+pub fn limit_handles(process: u32, handles: u64) {
+    let process = i32::try_from(process).ok().and_then(Pid::from_raw).expect("a process");
+    let limit = Rlimit { current: Some(handles), maximum: Some(1 << 10) };
+    prlimit(Some(process), Resource::Nofile, limit).expect("set");
 }
 
 /// Writes a file in pieces, with pauses.

@@ -1,7 +1,7 @@
 //! What an operator has: the supervisor's messages, metrics, health, room, retention, settings that change, and retries.
 
 use super::isolating::{children, kill_child};
-use super::{Watched, disk, names};
+use super::{Watched, disk, gltf_naming, names};
 use crate::interop;
 use crate::support::planish;
 use planish::outcome::{Code, Status};
@@ -106,7 +106,7 @@ fn the_watchdog_hears_of_work_and_not_of_a_loop_that_turns() {
     w.drop_in("large.stl", &large);
     let heard = Supervisor::of(&mut w);
     w.wait_until("it is on its way", |w| w.is_running("large.stl") && !children(w.pid()).is_empty());
-    let child = Pid::from_raw(children(w.pid())[0]).expect("not 0");
+    let child = Pid::from_raw(children(w.pid())[0] as i32).expect("not 0");
     kill_process(child, Signal::STOP).expect("it lives");
     heard.hears_no_life();
     assert!(w.log().contains("nothing moves of what is on its way"), "{}", w.log());
@@ -168,7 +168,7 @@ fn health_is_an_exit_code_with_its_reasons() {
     w.wait_until("it tells", |w| w.status()["pid"] == w.pid());
     let (code, told) = health(&w, &[]);
     assert_eq!((code, told.lines().filter(|line| line.starts_with("good ")).count()), (Some(0), 8), "{told}");
-    w.drop_in("waits.gltf", GLTF.as_bytes());
+    w.drop_in("waits.gltf", gltf_naming("a.bin").as_bytes());
     w.wait_until("it waits", |w| w.status()["notable"][0]["state"] == "waits");
     assert_eq!(health(&w, &[]).0, Some(0));
     let (code, told) = health(&w, &["--max-age", "0"]);
@@ -180,11 +180,6 @@ fn health_is_an_exit_code_with_its_reasons() {
     let (code, told) = health(&w, &[]);
     assert!(code == Some(1) && told.contains("BAD   daemon       none runs"), "{told}");
 }
-
-const GLTF: &str = r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "a.bin", "byteLength": 36}],
-    "bufferViews": [{"buffer": 0, "byteLength": 36}],
-    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}],
-    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]}"#;
 
 /// No disk has so much room; where less is asked for, all goes on by itself.
 #[test]

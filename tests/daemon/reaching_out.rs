@@ -1,7 +1,8 @@
 //! What the daemon opens while hostile things lie in its inbox, as the system sees it: `strace` writes down each file that is
 //! opened, linked or moved, by any thread or process of it, with the path that it had.
 
-use super::{Watched, disk, names};
+use super::putting_away::NOBODY;
+use super::{Watched, disk, gltf_naming, names};
 use rustix::fs::{CWD, FileType, Mode, mknodat};
 use rustix::process::geteuid;
 use std::fs::{self, Permissions};
@@ -9,9 +10,6 @@ use std::os::unix::fs::{PermissionsExt, chown, symlink};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
-
-/// The user and group that have no rights.
-const NOBODY: u32 = 65534;
 
 /// What a program may read of the system: libraries, and what is told of itself and its container.
 const OF_THE_SYSTEM: [&str; 6] = ["/lib", "/usr/lib", "/etc/ld.so", "/proc/", "/sys/", "/dev/null"];
@@ -71,7 +69,7 @@ fn hostile(w: &Watched) {
     fs::set_permissions(&taken, Permissions::from_mode(0o777)).expect("set");
     for (name, uri) in [("near.gltf", "data.bin"), ("far.gltf", "../outside/secret.bin"), ("full.gltf", "/etc/passwd")]
     {
-        fs::write(inbox.join(name), gltf(uri)).expect("written");
+        fs::write(inbox.join(name), gltf_naming(uri)).expect("written");
     }
     fs::write(inbox.join("materials.obj"), "mtllib ../outside/secret.stl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
         .expect("written");
@@ -79,15 +77,6 @@ fn hostile(w: &Watched) {
     fs::create_dir(inbox.join(other)).expect("made");
     fs::set_permissions(inbox.join(other), Permissions::from_mode(0o777)).expect("set");
     symlink("../../outside/secret.stl", inbox.join("sub/deep.stl")).expect("linked");
-}
-
-fn gltf(uri: &str) -> String {
-    format!(
-        r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":36,"uri":"{uri}"}}],
-        "bufferViews":[{{"buffer":0,"byteLength":36}}],
-        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}}],
-        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}]}}"#
-    )
 }
 
 /// The paths of what was opened, and of what was linked, moved or removed, according to a line of strace.

@@ -17,7 +17,7 @@ pub(super) mod stage;
 
 use super::budget::Account;
 use super::travel::Travel;
-use crate::begun;
+use crate::begun::{self, Entry};
 use crate::job::Stage;
 use crate::report::ResultSettings;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
@@ -27,7 +27,7 @@ use serde::Deserialize;
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{Builder, Scope};
@@ -82,13 +82,14 @@ impl std::fmt::Display for Death {
 /// # Errors
 /// The system starts no process or thread.
 pub(super) fn run(travel: &Travel, folder: &Path) -> io::Result<Outcome> {
-    let mut child = start(travel, folder)?;
+    let mark = travel.mark_apart();
+    let mut child = start(travel, folder, mark.as_ref().map(|(path, _)| path))?;
     let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
     let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
         return Err(io::Error::other("a process was started without pipes"));
     };
     let line = Line::new(travel, stdin);
-    line.tell(&order(travel));
+    line.tell(&order(travel, mark.as_ref().map(|(_, entry)| entry.clone())));
     let (evidence, ended) = (Mutex::default(), AtomicBool::new(false));
     let child = Mutex::new(child);
     let followed: io::Result<_> = std::thread::scope(|scope| {
@@ -107,10 +108,8 @@ pub(super) fn run(travel: &Travel, folder: &Path) -> io::Result<Outcome> {
         Ok((ending, guard.join().unwrap_or(None), status?))
     });
     line.give_all_back();
-    if let Some((mark, _)) = travel.mark_apart() {
-        // What it died of is counted here, and not once more when this process ends.
-        begun::end_apart(&mark);
-    }
+    // What it died of is counted here, and not once more when this process ends.
+    mark.iter().for_each(|(path, _)| begun::end_apart(path));
     let (ending, ended_by_guard, status) = followed?;
     Ok(match (ended_by_guard, ending) {
         (Some(outcome), _) => outcome,
@@ -121,19 +120,19 @@ pub(super) fn run(travel: &Travel, folder: &Path) -> io::Result<Outcome> {
 }
 
 /// The program itself, even where another version has taken its place meanwhile.
-fn program() -> io::Result<std::path::PathBuf> {
+fn program() -> io::Result<PathBuf> {
     let itself = Path::new("/proc/self/exe");
     if itself.exists() { Ok(itself.to_owned()) } else { std::env::current_exe() }
 }
 
-fn start(travel: &Travel, folder: &Path) -> io::Result<Child> {
+fn start(travel: &Travel, folder: &Path, mark: Option<&PathBuf>) -> io::Result<Child> {
     let job = &travel.job;
     let mut command = Command::new(program()?);
     command.arg0("planish").arg("job").arg("--name").arg(&job.name).arg("--into").arg(folder).args(log_level());
     if let Some(within) = &job.within {
         command.arg("--within").arg(within);
     }
-    if let Some((mark, _)) = travel.mark_apart() {
+    if let Some(mark) = mark {
         command.arg("--mark").arg(mark);
     }
     if job.since.is_some() {
@@ -154,10 +153,10 @@ fn log_level() -> &'static [&'static str] {
     }
 }
 
-fn order(travel: &Travel) -> Order {
+fn order(travel: &Travel, mark: Option<Entry>) -> Order {
     let settings = &travel.settings;
     Order {
-        mark: travel.mark_apart().map(|(_, entry)| entry),
+        mark,
         settings: ResultSettings::from(&**settings),
         limits: settings.limits,
         jobs: settings.jobs,
