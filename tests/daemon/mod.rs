@@ -153,6 +153,8 @@ impl Watched {
 
     /// Asks the daemon to stop, and sees that it ends well.
     pub fn stop(&mut self) {
+        // Where all was done before, it may have been started only now, and a signal that it does not yet hear ends it.
+        self.wait_until("it hears signals", |w| hears(w.pid(), Signal::TERM));
         self.signal(Signal::TERM);
         let status = self.wait();
         assert_eq!(status.code(), Some(0), "{}", self.log());
@@ -298,6 +300,15 @@ pub fn write_slowly(path: &Path, bytes: &[u8], pieces: usize, pause: Duration) {
 }
 
 /// Sends a process a signal.
+/// Whether a process handles a signal, or has ended; where the system does not tell, it is taken to.
+fn hears(id: u32, signal: Signal) -> bool {
+    let status = fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();
+    let of = |key| status.lines().find_map(|line| line.strip_prefix(key)).map(str::trim);
+    let caught = of("SigCgt:").and_then(|mask| u64::from_str_radix(mask, 16).ok());
+    of("State:").is_some_and(|state| state.starts_with('Z'))
+        || caught.is_none_or(|mask| mask >> (signal.as_raw() - 1) & 1 == 1)
+}
+
 pub fn send(process: &Child, signal: Signal) {
     kill_process(Pid::from_child(process), signal).expect("sent");
 }
