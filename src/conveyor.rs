@@ -42,10 +42,10 @@ use board::Running;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use grants::{Grants, Own};
 use parking_lot::RwLock;
-use pipeline::MappedChart;
-use pipeline::atlas::Chart;
-use pipeline::host::Host;
-use pipeline::mesh::TriangleSoup;
+use planish_core::MappedChart;
+use planish_core::atlas::Chart;
+use planish_core::mesh::TriangleSoup;
+use planish_core::monitor::Host;
 use queue::Queue;
 use reading::Next;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -320,7 +320,7 @@ fn untangle(Mapped { surface, place, mapped }: Mapped, finished: &Sender<Finishe
 fn deposit(
     surface: Arc<Surface>,
     place: Place,
-    part: Result<Vec<(Chart, pipeline::CertifiedChart)>, Stopped>,
+    part: Result<Vec<(Chart, planish_core::CertifiedChart)>, Stopped>,
     finished: &Sender<Finished>,
 ) {
     if surface.deposit(place, part) {

@@ -2,18 +2,18 @@
 
 use crate::formats::gmsh;
 use crate::report::HandOff;
-use pipeline::CertifiedChart;
-use pipeline::atlas::Chart;
-use pipeline::distortion::Summary;
-use pipeline::evaluate::Plane;
-use pipeline::host::Alone;
-use pipeline::id::{ChartId, FaceId};
-use pipeline::mesh::SurfaceMesh;
-use pipeline::natural::{Natural, natural};
-use pipeline::seams::{Curve, Passage, SeamNetwork};
-use pipeline::space::unit_scale;
-use pipeline::spikes::spikes;
-use pipeline::subdivide::{self, LinearAtlas, subdivide};
+use planish_core::CertifiedChart;
+use planish_core::atlas::Chart;
+use planish_core::evaluate::Plane;
+use planish_core::map::natural::{Natural, natural};
+use planish_core::measure::distortion::Summary;
+use planish_core::measure::spikes::spikes;
+use planish_core::mesh::SurfaceMesh;
+use planish_core::monitor::Alone;
+use planish_core::seams::{Curve, Passage, SeamNetwork};
+use planish_core::subdivide::{self, LinearAtlas, subdivide};
+use planish_core::topology::{ChartId, FaceId};
+use planish_core::vec3::unit_scale;
 use std::collections::BTreeMap;
 
 /// Gmsh gets at least this many edges along the diagonal of the bounding box, unless another size is asked for.

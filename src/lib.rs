@@ -1,6 +1,6 @@
 //! planish: certified one-to-one quadratic parametrizations of poor surface triangulations.
 //!
-//! This is the shell around the pure crate [`pipeline`], as a library so that tests reach it: the only code that
+//! This is the shell around the pure crate [`planish_core`], as a library so that tests reach it: the only code that
 //! touches disk, clock, threads and environment. The verbs are in [`verbs`]; an input travels as a [`job::Job`] through
 //! the [`stages`], which [`conveyor`] runs on threads.
 

@@ -51,7 +51,7 @@ fn keep<T: Clone + PartialEq>(name: &'static str, in_force: &T, asked: &mut T, l
 mod tests {
     use super::*;
     use crate::settings::{Inputs, Said};
-    use pipeline::Order;
+    use planish_core::Order;
 
     fn settings(toml: &str) -> Settings {
         toml::from_str::<Said>(toml).expect("well-formed").check().expect("in range")

@@ -7,7 +7,7 @@ use crate::hooks::{Hook, HookRefused, Occasion};
 use crate::machine;
 use crate::shown::shown;
 use bytesize::ByteSize;
-use pipeline::Order;
+use planish_core::Order;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -154,8 +154,8 @@ pub struct Settings {
 
 impl Settings {
     /// What decomposition must respect.
-    pub fn decompose(&self) -> pipeline::decompose::Settings {
-        pipeline::decompose::Settings {
+    pub fn decompose(&self) -> planish_core::decompose::Settings {
+        planish_core::decompose::Settings {
             max_area_ratio: self.max_area_ratio,
             max_triangles: self.max_triangles.unwrap_or(usize::MAX),
             strict_disks: self.strict_disks,
@@ -308,13 +308,13 @@ impl Said {
     /// # Errors
     /// [`SettingsError`] for values out of range.
     pub fn check(self) -> Result<Settings, SettingsError> {
-        let core = pipeline::decompose::Settings::default();
+        let core = planish_core::decompose::Settings::default();
         let order = match self.order.unwrap_or(2) {
             1 => Order::Linear,
             2 => Order::Quadratic,
             other => return Err(SettingsError::Order(other)),
         };
-        let weld = self.weld.unwrap_or(pipeline::repair::Settings::default().weld);
+        let weld = self.weld.unwrap_or(planish_core::repair::Settings::default().weld);
         if !(0.0..=0.01).contains(&weld) {
             return Err(SettingsError::Weld(weld));
         }

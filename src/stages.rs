@@ -10,16 +10,16 @@ use crate::regular::{self, OpenError};
 use crate::report::{self, Decomposition, Output, Report};
 use crate::settings::{self, Settings};
 use bytesize::ByteSize;
-use pipeline::atlas::{Atlas, Chart};
-use pipeline::decompose::{self, split_ears};
-use pipeline::distortion::{self, CellFields};
-use pipeline::host::{Alone, Host};
-use pipeline::mesh::{SurfaceMesh, TriangleSoup};
-use pipeline::repair::Repaired;
-use pipeline::seams::SeamNetwork;
-use pipeline::{
-    CertifiedChart, MapError, MappedChart, SplitError, finish_or_split, linear, map_or_split, repair, sparse,
-};
+use planish_core::atlas::{Atlas, Chart};
+use planish_core::decompose::{self, split_ears};
+use planish_core::fem::sparse;
+use planish_core::map::linear;
+use planish_core::measure::distortion::{self, CellFields};
+use planish_core::mesh::{SurfaceMesh, TriangleSoup};
+use planish_core::monitor::{Alone, Host};
+use planish_core::repair::Repaired;
+use planish_core::seams::SeamNetwork;
+use planish_core::{CertifiedChart, MapError, MappedChart, SplitError, finish_or_split, map_or_split, repair};
 use std::cell::RefCell;
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -221,7 +221,7 @@ impl Beside for Folder<'_> {
 /// # Errors
 /// The refusal, where nothing is left.
 pub fn repaired(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Reason> {
-    let found = repair(soup, &pipeline::repair::Settings { weld: settings.weld });
+    let found = repair(soup, &planish_core::repair::Settings { weld: settings.weld });
     found.map_err(|e| not_repaired(&e))
 }
 
@@ -260,7 +260,7 @@ pub fn cut(
     report.warnings = report::warnings(&found);
     report.warnings.iter().for_each(|w| tracing::warn!("{}", w.message));
     check_sheets(&found)?;
-    let atlas = pipeline::decompose(&found.mesh, &settings.decompose(), host).map_err(not_cut)?;
+    let atlas = planish_core::decompose(&found.mesh, &settings.decompose(), host).map_err(not_cut)?;
     let feature_edges = atlas.feature_edges();
     report.decomposition = Some(Decomposition { feature_edges, ..Decomposition::default() });
     let without = split_ears(&found.mesh, &atlas, settings.decompose().max_triangles);

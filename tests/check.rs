@@ -1,10 +1,10 @@
 //! `planish check`: it proves what is right and finds what was tampered with, even behind new checksums.
 
 use crate::support::{Ended, Out, fixture, planish};
-use pipeline::certify::PlanarMap;
-use pipeline::grid::GridPoint;
 use planish::formats::vtu;
 use planish::report::{Output, Report, chart_checksum};
+use planish_core::certify::PlanarMap;
+use planish_core::grid::GridPoint;
 use vtkio::model::{Attribute, DataSet, IOBuffer, Piece, UnstructuredGridPiece, Vtk};
 use vtkio::xml::Compressor;
 

@@ -62,7 +62,7 @@ fn write(path: &Path, points: &[[f64; 3]], triangles: &[[u32; 3]]) {
 #[test]
 fn bad_meshes_are_refused_with_places_and_kept_reports() {
     let inputs = tempfile::tempdir().expect("a folder");
-    let sphere = pipeline::shapes::sphere(10);
+    let sphere = planish_core::shapes::sphere(10);
     let (points, triangles) = (sphere.points().to_vec(), sphere.triangles().to_vec());
     let at = |name: &str| inputs.path().join(name);
     write(&at("sphere.obj"), &points, &triangles);

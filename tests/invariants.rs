@@ -1,11 +1,12 @@
 //! What must not depend on how a surface is given: every fixture, scaled, turned and shuffled.
 
 use crate::fixtures::{ALL, generate};
-use pipeline::atlas::Chart;
-use pipeline::host::Alone;
-use pipeline::mesh::TriangleSoup;
-use pipeline::{CertifiedChart, Order, decompose, distortion, finish_or_split, map_or_split, repair};
 use planish::formats::{self, Kind};
+use planish_core::atlas::Chart;
+use planish_core::measure::distortion;
+use planish_core::mesh::TriangleSoup;
+use planish_core::monitor::Alone;
+use planish_core::{CertifiedChart, Order, decompose, finish_or_split, map_or_split, repair};
 
 /// The largest area ratio: enough for the bent disk to stay whole, so that its energies can be compared.
 const MAX_AREA_RATIO: f64 = 1e7;

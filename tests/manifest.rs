@@ -2,10 +2,10 @@
 //! they make when bit-equal points are one. Blank columns promise nothing.
 
 use crate::corpus::{manifest, shared};
-use pipeline::mesh::Census;
 use planish::formats::{Format, Kind, kind};
 use planish::settings::{Said, Settings};
 use planish::stages::{Folder, decode};
+use planish_core::topology::Census;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -18,7 +18,7 @@ fn found(path: &Path, settings: &Settings) -> Option<Vec<(&'static str, String)>
     // Readers of MSH leave nodes in the middle of edges out; they are points of the file all the same.
     let left_out = if kind(path) == Kind::Mesh(Format::Msh) { content.notes.mid_nodes } else { 0 };
     let [points, triangles] = [content.soup.points().len() + left_out, content.soup.triangles().len()];
-    let repaired = pipeline::repair(&content.soup, &pipeline::repair::Settings { weld: 0.0 }).ok()?;
+    let repaired = planish_core::repair(&content.soup, &planish_core::repair::Settings { weld: 0.0 }).ok()?;
     let raw: Census = repaired.raw;
     let found = [
         ("vertices_file", points as i64),

@@ -73,7 +73,7 @@ fn points_without_triangles_are_counted_whatever_their_coordinates_are() {
 /// As one chart, the area ratio of this finger would be e^88.
 #[test]
 fn a_chart_beyond_double_precision_is_split_until_it_maps() {
-    let finger = pipeline::shapes::finger(12, 22);
+    let finger = planish_core::shapes::finger(12, 22);
     let mut text: String = finger.points().iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
     text.extend(finger.triangles().iter().rev().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1)));
     for limit in ["1e6", "100"] {

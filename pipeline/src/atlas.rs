@@ -1,7 +1,8 @@
 //! Charts: parts of a surface that a disk can carry.
 
-use crate::id::{ChartId, FaceId, HalfEdgeId, VertexId};
-use crate::mesh::{EdgeTable, TriangleShape};
+use crate::mesh::TriangleShape;
+use crate::topology::EdgeTable;
+use crate::topology::{ChartId, FaceId, HalfEdgeId, VertexId};
 
 /// A connected, oriented part of a surface of genus 0 whose boundary loops are simple and share no vertex.
 /// Made by [`crate::decompose()`].

@@ -3,17 +3,17 @@
 mod cut;
 
 use crate::atlas::Chart;
-use crate::boundary::{Boundary, Mids};
 use crate::certify::{self, CertifiedMap, PlanarMap, prove};
-use crate::closed::ClosedChart;
 use crate::decompose;
-use crate::distortion;
+use crate::fem::sparse;
 use crate::grid::GridPoint;
-use crate::host::{Alone, Cancelled, Host, Pace};
-use crate::linear::{self, LinearMap, linear_map, lower_ears};
+use crate::map::boundary::{Boundary, Mids};
+use crate::map::closed::ClosedChart;
+use crate::map::linear::{self, LinearMap, linear_map, lower_ears};
+use crate::map::quadratic::{QuadraticMap, least_det, quadratic_map};
+use crate::measure::distortion;
 use crate::mesh::SurfaceMesh;
-use crate::quadratic::{QuadraticMap, least_det, quadratic_map};
-use crate::sparse;
+use crate::monitor::{Alone, Cancelled, Host, Pace};
 use crate::untangle::{self, Untangled, untangle};
 use cut::{Attempt, Cutter};
 
@@ -336,7 +336,7 @@ mod tests {
         assert!(strips.len() >= 2, "{}", strips.len());
         for strip in &strips {
             assert!(strip.holes().is_empty());
-            let natural = crate::natural::natural(&mesh, strip, f64::MAX, &Alone).expect("it unrolls");
+            let natural = crate::map::natural::natural(&mesh, strip, f64::MAX, &Alone).expect("it unrolls");
             assert!(natural.distortion.conformal_p99 < 4.0, "{:?}", natural.distortion);
         }
         let (_, whole) = parts(&shapes::tube(36, 6, 3.0));
@@ -355,7 +355,7 @@ mod tests {
     fn a_tall_box_falls_into_parts_that_unroll_and_a_low_one_stays_whole() {
         let (mesh, walls) = parts(&open_box(100.0));
         assert!((2..=3).contains(&walls.len()), "{}", walls.len());
-        let unrolls = |part| crate::natural::natural(&mesh, part, f64::MAX, &Alone).is_some();
+        let unrolls = |part| crate::map::natural::natural(&mesh, part, f64::MAX, &Alone).is_some();
         assert!(walls.iter().all(unrolls));
         let (_, whole) = parts(&open_box(12.0));
         assert_eq!(whole.len(), 1, "it stretches, but no more than others");

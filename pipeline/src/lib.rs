@@ -4,13 +4,13 @@
 //!
 //! 1. [`repair()`] turns a soup into a [`mesh::SurfaceMesh`]: welded, oriented, with mollified edge lengths.
 //! 2. [`decompose()`] cuts the surface into [`atlas::Chart`]s: parts that a disk, perhaps with holes, can carry.
-//! 3. [`map_chart`] makes the [`linear`] map, which does not fold, and the harmonic [`quadratic`] map, whose curved
+//! 3. [`map_chart`] makes the [`linear`](map::linear) map, which does not fold, and the harmonic [`quadratic`](map::quadratic) map, whose curved
 //!    triangles may be invalid.
 //! 4. [`finish_chart`] makes them valid ([`mod@untangle`]) while keeping the Dirichlet energy as low as it can be, and
 //!    proves the result one-to-one ([`certify`]). Charts whose maps stretch too much are split, before it
 //!    ([`map_or_split`]; there charts that no mesher could follow are cut, too) or, where only the result shows it, after
 //!    it ([`finish_or_split`]).
-//! 5. [`distortion`] measures what came out; [`seams`] finds the curves between charts.
+//! 5. [`measure`] tells what came out; [`seams`] finds the curves between charts.
 //! 6. [`mod@subdivide`] makes linear triangulations of certified maps, for meshers.
 //!
 //! # What is promised
@@ -22,8 +22,8 @@
 //!
 //! # Cancelling, taking turns, and memory
 //!
-//! Whatever can take long asks a [`host::Host`] many times a second whether to go on, and reserves memory from it before
-//! it factorises. [`host::Alone`] always goes on.
+//! Whatever can take long asks a [`monitor::Host`] many times a second whether to go on, and reserves memory from it before
+//! it factorises. [`monitor::Alone`] always goes on.
 //!
 //! # What is not
 //!
@@ -35,8 +35,8 @@
 //! # Example
 //!
 //! ```
-//! use pipeline::host::Alone;
-//! use pipeline::{Order, decompose, finish_chart, map_chart, repair, shapes};
+//! use planish_core::monitor::Alone;
+//! use planish_core::{Order, decompose, finish_chart, map_chart, repair, shapes};
 //!
 //! let soup = shapes::disk(8);
 //! let surface = repair(&soup, &Default::default())?.mesh;
@@ -50,40 +50,25 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod buckets;
-pub mod id;
-pub mod space;
-mod union_find;
-
 pub mod atlas;
-pub mod bernstein;
-pub mod closed;
-pub mod element;
-mod elimination;
-pub mod grid;
-pub mod host;
-mod jacobian;
-pub mod mesh;
-pub mod shapes;
-pub mod sparse;
-mod weights;
-
-pub mod boundary;
 pub mod certify;
 mod chart_map;
-pub mod curvature;
 pub mod decompose;
-pub mod distortion;
 pub mod evaluate;
-pub mod linear;
-pub mod natural;
-pub mod quadratic;
+pub mod fem;
+pub mod grid;
+pub mod map;
+pub mod measure;
+pub mod mesh;
+pub mod monitor;
 pub mod repair;
 pub mod seams;
+pub mod shapes;
 pub mod soundness;
-pub mod spikes;
 pub mod subdivide;
+pub mod topology;
 pub mod untangle;
+pub mod vec3;
 
 pub use chart_map::{
     CertifiedChart, Harmonic, MapError, MappedChart, Order, SplitError, finish_chart, finish_or_split, map_chart,

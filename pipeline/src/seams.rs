@@ -17,9 +17,9 @@ mod kinks;
 pub(crate) use distance::segment_distance;
 
 use crate::atlas::Chart;
-use crate::id::{ChartId, CurveId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;
-use crate::space::distance;
+use crate::topology::{ChartId, CurveId, HalfEdgeId, VertexId};
+use crate::vec3::distance;
 
 /// All curves of an atlas.
 #[derive(Clone, Debug, Default)]

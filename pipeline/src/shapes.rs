@@ -3,7 +3,7 @@
 //! None of them depends on anything but its arguments.
 
 use crate::mesh::TriangleSoup;
-use crate::space::Vec3;
+use crate::vec3::Vec3;
 use std::f64::consts::TAU;
 
 /// The soup of `points` and `triangles`, which the makers below know to be sound.

@@ -1,13 +1,13 @@
 //! Convergence: halving the mesh must divide the error as theory says.
 
-use pipeline::boundary::Boundary;
-use pipeline::closed::ClosedChart;
-use pipeline::element::{basis, stiffness};
-use pipeline::host::Alone;
-use pipeline::linear::harmonic_places;
-use pipeline::quadratic::quadratic_map;
-use pipeline::space::{Vec3, midpoint, triangle_area};
-use pipeline::{decompose, repair, shapes};
+use planish_core::fem::element::{basis, stiffness};
+use planish_core::map::boundary::Boundary;
+use planish_core::map::closed::ClosedChart;
+use planish_core::map::linear::harmonic_places;
+use planish_core::map::quadratic::quadratic_map;
+use planish_core::monitor::Alone;
+use planish_core::vec3::{Vec3, midpoint, triangle_area};
+use planish_core::{decompose, repair, shapes};
 
 /// Real and imaginary part of e^z / 4, which are harmonic.
 fn exact(p: Vec3) -> [f64; 2] {
@@ -32,8 +32,8 @@ fn errors(rings: u32) -> [f64; 2] {
     let mesh = repair(&shapes::flat_disk(rings), &Default::default()).expect("a surface").mesh;
     let chart =
         ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
-    let place = |v: pipeline::id::VertexId| mesh.points()[v.index()];
-    let ends = |h: &pipeline::id::HalfEdgeId| chart.ends(*h).map(place);
+    let place = |v: planish_core::topology::VertexId| mesh.points()[v.index()];
+    let ends = |h: &planish_core::topology::HalfEdgeId| chart.ends(*h).map(place);
     let vertices: Vec<_> = chart.outer().iter().map(|h| exact(ends(h)[0])).collect();
     let mids: Vec<_> = chart.outer().iter().map(|h| exact(midpoint(ends(h)[0], ends(h)[1]))).collect();
     let boundary = Boundary::through(&chart, &vertices, &mids).expect("one per node");
@@ -67,9 +67,9 @@ fn linear_elements_are_of_order_2_and_quadratic_ones_of_order_3() {
 #[test]
 fn the_energy_of_the_interpolant_converges() {
     let p: [Vec3; 3] = [[0.1, 0.2, 0.0], [0.13, 0.2, 0.0], [0.1, 0.24, 0.0]];
-    let shape = pipeline::mesh::TriangleShape::of(p);
+    let shape = planish_core::mesh::TriangleShape::of(p);
     let nodes = [p[0], p[1], p[2], midpoint(p[0], p[1]), midpoint(p[1], p[2]), midpoint(p[2], p[0])].map(exact);
-    let discrete = pipeline::element::energy(&stiffness(&shape), &nodes);
+    let discrete = planish_core::fem::element::energy(&stiffness(&shape), &nodes);
     let density = |l: [f64; 3]| {
         let x: f64 = (0..3).map(|i| l[i] * p[i][0]).sum();
         (0.25 * x.exp()).powi(2)

@@ -1,17 +1,18 @@
 //! The small exact examples: triangulations whose harmonic map folds. Expected values were found in rational
 //! arithmetic, apart from this program.
 
-use pipeline::boundary::{Boundary, Mids};
-use pipeline::certify::{PlanarMap, prove};
-use pipeline::closed::ClosedChart;
-use pipeline::grid::GridPoint;
-use pipeline::host::Alone;
-use pipeline::linear::{self, Method, folded, harmonic_places, linear_map, mean_value_map};
-use pipeline::mesh::TriangleSoup;
-use pipeline::quadratic::{QuadraticMap, quadratic_map};
-use pipeline::space::{Vec3, distance};
-use pipeline::untangle::untangle;
-use pipeline::{bernstein, decompose, repair, shapes};
+use planish_core::certify::{PlanarMap, prove};
+use planish_core::fem::bernstein;
+use planish_core::grid::GridPoint;
+use planish_core::map::boundary::{Boundary, Mids};
+use planish_core::map::closed::ClosedChart;
+use planish_core::map::linear::{self, Method, folded, harmonic_places, linear_map, mean_value_map};
+use planish_core::map::quadratic::{QuadraticMap, quadratic_map};
+use planish_core::mesh::TriangleSoup;
+use planish_core::monitor::Alone;
+use planish_core::untangle::untangle;
+use planish_core::vec3::{Vec3, distance};
+use planish_core::{decompose, repair, shapes};
 use std::f64::consts::TAU;
 
 const TOLERANCE: f64 = 1e-8;
@@ -60,7 +61,7 @@ impl Example {
             t.sort_unstable();
             t
         };
-        let same = |t: &[pipeline::id::VertexId; 3]| sorted(t.map(|v| v.0)) == sorted(vertices);
+        let same = |t: &[planish_core::topology::VertexId; 3]| sorted(t.map(|v| v.0)) == sorted(vertices);
         self.chart.triangles().iter().position(same).expect("a triangle of the example")
     }
 
@@ -191,7 +192,7 @@ fn radii(soup: &TriangleSoup) -> Vec<f64> {
     let mut radii = vec![-1.0; soup.points().len()];
     for v in 0..mesh.points().len() {
         let [x, y] = map.nodes()[v].uv();
-        radii[mesh.welded_vertex(pipeline::id::VertexId::at(v)) as usize] = x.hypot(y);
+        radii[mesh.welded_vertex(planish_core::topology::VertexId::at(v)) as usize] = x.hypot(y);
     }
     radii
 }

@@ -4,9 +4,9 @@ use super::travel::Travel;
 use crate::job::Stopped;
 use crate::report::Report;
 use parking_lot::Mutex;
-use pipeline::CertifiedChart;
-use pipeline::atlas::Chart;
-use pipeline::mesh::SurfaceMesh;
+use planish_core::CertifiedChart;
+use planish_core::atlas::Chart;
+use planish_core::mesh::SurfaceMesh;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::outcome::{Code, Reason};
     use crate::report::Input;
-    use pipeline::{repair, shapes};
+    use planish_core::{repair, shapes};
 
     /// Which part stops a job does not depend on which thread was first.
     #[test]

@@ -14,7 +14,7 @@ use crate::stages::{self, guard};
 use crate::vitals;
 use crossbeam_channel::Sender;
 use parking_lot::{Mutex, RwLock};
-use pipeline::host::Host;
+use planish_core::monitor::Host;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -310,7 +310,7 @@ pub(super) mod tests {
         let travel = begin(&shared);
         assert_eq!(shared.board.running().len(), 1);
         let stopped = travel.compute(Stage::Map, |host| -> Result<(), Stopped> {
-            let _held = pipeline::host::Reserved::new(host, 1 << 19);
+            let _held = planish_core::monitor::Reserved::new(host, 1 << 19);
             panic!("a fault, for the test");
         });
         assert!(matches!(stopped, Err(Stopped::For(reason)) if reason.code == Code::Internal));
@@ -349,7 +349,7 @@ pub(super) mod tests {
         let rounds = |travel: &Arc<Travel>| {
             for _ in 0..200 {
                 let done = travel.compute(Stage::Map, |host| {
-                    let _held = pipeline::host::Reserved::new(host, 3 << 18);
+                    let _held = planish_core::monitor::Reserved::new(host, 3 << 18);
                     host.go_on();
                     Ok(())
                 });

@@ -1,6 +1,6 @@
 //! What readers are given, and what they give.
 
-use pipeline::mesh::TriangleSoup;
+use planish_core::mesh::TriangleSoup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

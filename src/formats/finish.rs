@@ -2,8 +2,8 @@
 
 use super::place::Place;
 use super::{Content, Notes, ReadError};
-use pipeline::mesh::{SoupError, TriangleSoup};
-use pipeline::space::Vec3;
+use planish_core::mesh::{SoupError, TriangleSoup};
+use planish_core::vec3::Vec3;
 
 /// Where points are that can be no corners ([`TriangleSoup::may_hold`]), by their numbers, which ascend. Whether a triangle
 /// has them for corners shows at the end only.

@@ -24,8 +24,8 @@ mod words;
 use crate::outcome::{Code, Reason};
 pub use content::{Beside, Content, Limits, Notes, Nothing, Source, TooMany};
 pub use patches::Patches;
-use pipeline::mesh::SoupError;
 use place::Place;
+use planish_core::mesh::SoupError;
 use std::path::Path;
 pub use vtk::{vtm, vtp, vtu};
 
@@ -477,7 +477,7 @@ mod tests {
             for (format, bytes) in with("0", bad) {
                 let soup = read_alone(format, &bytes).unwrap_or_else(|e| panic!("{format}, {bad}: {e}")).soup;
                 assert_eq!((soup.points().len(), soup.points()[1]), (4, [1.0, 0.0, 0.0]), "{format}");
-                let repaired = pipeline::repair(&soup, &Default::default()).expect("a triangle");
+                let repaired = planish_core::repair(&soup, &Default::default()).expect("a triangle");
                 assert_eq!(repaired.report.unreferenced_points, 1, "{format}");
             }
             for (format, bytes) in with(bad, "0") {

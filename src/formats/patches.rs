@@ -1,7 +1,7 @@
 //! A mesh with what its file tells of its elements.
 
-use pipeline::mesh::TriangleSoup;
-use pipeline::space::Vec3;
+use planish_core::mesh::TriangleSoup;
+use planish_core::vec3::Vec3;
 
 /// Triangles, each with the surface that it was made on, and the nodes in the middle of its sides.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,14 +4,15 @@ use super::{
     Boundary, Certificate, ChartReport, Counts, Distortion, Linear, Quadratic, RepairedSurface, Repairs, Seam, Seams,
     Surface, Untangle,
 };
-use pipeline::CertifiedChart;
-use pipeline::atlas::Chart;
-use pipeline::certify::{CertifiedMap, PlanarMap};
-use pipeline::distortion::{CellFields, Summary};
-use pipeline::mesh::Census;
-use pipeline::repair::{self, Repaired};
-use pipeline::seams::{Curve, SeamNetwork};
-use pipeline::{linear, untangle};
+use planish_core::CertifiedChart;
+use planish_core::atlas::Chart;
+use planish_core::certify::{CertifiedMap, PlanarMap};
+use planish_core::map::linear;
+use planish_core::measure::distortion::{CellFields, Summary};
+use planish_core::repair::{self, Repaired};
+use planish_core::seams::{Curve, SeamNetwork};
+use planish_core::topology::Census;
+use planish_core::untangle;
 
 /// The surface before and after repair.
 pub fn surface(repaired: &Repaired) -> Surface {

@@ -1,8 +1,8 @@
 //! mesh.json: what `planish check --mesh` found. The schema is in docs/mesh.schema.json; within version 1 it only grows.
 
 use super::Output;
-use pipeline::soundness::{Defect, Findings};
-use pipeline::space::Vec3;
+use planish_core::soundness::{Defect, Findings};
+use planish_core::vec3::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// The version of the schema.
@@ -115,7 +115,7 @@ impl MeshReport {
     /// The report of what was found, for a mesh of `size` held against a surface.
     pub fn new(mesh: Output, surface: Output, size: f64, min_gamma: f64, found: &Findings) -> Self {
         let defect = |d: &Defect| MeshDefect { kind: kind(d).to_owned(), message: d.to_string(), at: d.at() };
-        let distance = |d: &pipeline::soundness::Farthest| Distance { distance: d.distance, at: d.at };
+        let distance = |d: &planish_core::soundness::Farthest| Distance { distance: d.distance, at: d.at };
         let (edges, below) = (found.edges, found.bad.len());
         Self {
             schema: SCHEMA,
@@ -150,7 +150,7 @@ impl MeshReport {
 /// The worst places: where the mesh is not faithful first, then the worst elements.
 fn places(found: &Findings) -> Vec<Place> {
     let defects = found.defects.iter().filter_map(|d| Some(Place { what: d.to_string(), at: d.at()? }));
-    let bad = |b: &pipeline::soundness::BadElement| Place { what: format!("gamma {:.4}", b.gamma), at: b.at };
+    let bad = |b: &planish_core::soundness::BadElement| Place { what: format!("gamma {:.4}", b.gamma), at: b.at };
     defects.chain(found.bad.iter().map(bad)).take(PLACES).collect()
 }
 

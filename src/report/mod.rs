@@ -10,7 +10,7 @@ use crate::outcome::{Reason, Status};
 use crate::settings::{self, Settings};
 use crate::shown::printable_json;
 pub use build::{certificate, chart_checksum, chart_report, repairs, seams, surface};
-use pipeline::Order;
+use planish_core::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 pub use warnings::{Doubt, Warning, warnings};

@@ -1,7 +1,7 @@
 //! What a surface may suffer from although it is certified: told to people, and in report.json.
 
-use pipeline::mesh::{CoordinateSteps, FEW_STEPS, ValueApart};
-use pipeline::repair::{Found, Repaired};
+use planish_core::mesh::{CoordinateSteps, FEW_STEPS, ValueApart};
+use planish_core::repair::{Found, Repaired};
 use serde::{Deserialize, Serialize};
 
 /// A share of the triangles above this is nearly all.
@@ -118,8 +118,8 @@ fn all_mollified(mollified: usize, triangles: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pipeline::mesh::TriangleSoup;
-    use pipeline::{repair, shapes};
+    use planish_core::mesh::TriangleSoup;
+    use planish_core::{repair, shapes};
 
     /// A terrain of heights, moved by `origin`, in 32 bits, with holes of this value.
     fn terrain(origin: [f64; 3], hole: Option<f64>) -> Vec<Doubt> {

@@ -1,6 +1,6 @@
 //! `planish check`: prove a result again, from the files on disk.
 //!
-//! The maps are read from surface.vtu and proven by [`pipeline::certify::prove`], which knows nothing of how they
+//! The maps are read from surface.vtu and proven by [`planish_core::certify::prove`], which knows nothing of how they
 //! were made. The only thing taken from the report is a point in each hole, which the proof tests; what the report
 //! claims beyond that must agree with what is found. Checksums are a second, separate test: a map that is broken
 //! fails the first one even if all checksums were made anew.
@@ -13,8 +13,8 @@ use crate::outcome::{Reason, Status};
 use crate::report::{self, ChartReport, Report, certificate, chart_checksum};
 use crate::settings::HandOff;
 use crate::stages::{guard, read_file};
-use pipeline::certify::{self, PlanarMap, prove};
-use pipeline::grid::GridPoint;
+use planish_core::certify::{self, PlanarMap, prove};
+use planish_core::grid::GridPoint;
 use std::path::{Path, PathBuf};
 
 /// The files that every certified result has.
@@ -180,7 +180,7 @@ fn check_surface(grid: &Grid, report: &Report) -> Vec<Finding> {
     if let Some(point) = grid.points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
         found.push(wrong(format!("point {point} is not finite")));
     }
-    let possible = |f: &pipeline::distortion::CellFields| {
+    let possible = |f: &planish_core::measure::distortion::CellFields| {
         f.det_min > 0.0
             && f.det_min <= f.det_max
             && (f64::MIN_POSITIVE..=1.0).contains(&f.jacobian_ratio)
@@ -241,7 +241,7 @@ fn planar_map(grid: &Grid, cells: &[usize], chart: &ChartReport) -> Result<Plana
 fn unproven(grid: &Grid, cells: &[usize], chart: u32, error: certify::Error) -> Finding {
     match error {
         certify::Error::InvalidTriangles { all, .. } => {
-            let id = |f: &pipeline::id::FaceId| grid.triangle[cells[f.index()]].to_string();
+            let id = |f: &planish_core::topology::FaceId| grid.triangle[cells[f.index()]].to_string();
             let mut triangles = all.iter().take(16).map(id).collect::<Vec<_>>().join(", ");
             if all.len() > 16 {
                 triangles += &format!(", ... ({} in all)", all.len());

@@ -14,7 +14,7 @@ use crate::report::mesh::{MeshReport, PLACES};
 use crate::report::{Output, Report};
 use crate::settings::Settings;
 use crate::stages::{guard, read_file_into};
-use pipeline::soundness::{self, HandedOverAtlas, Mesh, Triangulation};
+use planish_core::soundness::{self, HandedOverAtlas, Mesh, Triangulation};
 use std::path::{Path, PathBuf};
 
 /// What is asked of a mesh.

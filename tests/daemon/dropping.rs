@@ -187,7 +187,7 @@ fn the_status_tells_what_is_done_and_what_runs() {
 
 /// A document and its data: a disk in glTF.
 fn gltf(n: u32, twist: f64) -> (String, Vec<u8>) {
-    let soup = pipeline::shapes::disk(n);
+    let soup = planish_core::shapes::disk(n);
     let coordinates = soup.points().iter().flatten().map(|x| (x * (1.0 + 1e-3 * twist)) as f32);
     let mut data: Vec<u8> = coordinates.flat_map(f32::to_le_bytes).collect();
     let (points, corners) = (soup.points().len(), 3 * soup.triangles().len());

@@ -253,7 +253,7 @@ pub fn names(folder: &Path) -> BTreeSet<String> {
 
 /// A disk with bumps, as a binary STL: about 6 n^2 triangles. Different `twist`s are different surfaces.
 pub fn disk(n: u32, twist: f64) -> Vec<u8> {
-    let soup = pipeline::shapes::disk(n);
+    let soup = planish_core::shapes::disk(n);
     let point = |i: u32| soup.points()[i as usize].map(|x| (x * (1.0 + 1e-3 * twist)) as f32);
     let mut bytes = vec![0_u8; 80];
     bytes.extend((soup.triangles().len() as u32).to_le_bytes());

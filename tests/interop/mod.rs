@@ -126,7 +126,8 @@ fn every_report_follows_the_published_schema() {
 
 /// Surfaces with nothing in common but the file.
 fn several(folder: &Path) -> PathBuf {
-    let parts = [pipeline::shapes::disk(4), pipeline::shapes::sphere(6), pipeline::shapes::ring_torus(9, 6)];
+    let parts =
+        [planish_core::shapes::disk(4), planish_core::shapes::sphere(6), planish_core::shapes::ring_torus(9, 6)];
     let (mut text, mut base) = (String::new(), 1);
     for (part, soup) in (0..).zip(&parts) {
         soup.points().iter().for_each(|[x, y, z]| text += &format!("v {} {y} {z}\n", x + 5.0 * f64::from(part)));

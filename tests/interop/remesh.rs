@@ -2,12 +2,12 @@
 
 use super::{PYTHON, assert_vtk_agrees, run, script};
 use crate::support::{Ended, Out, fixture, planish, root};
-use pipeline::decompose::assemble;
-use pipeline::mesh::TriangleSoup;
-use pipeline::{repair, shapes};
 use planish::report::{Input, Report};
 use planish::settings::{Said, Settings};
 use planish::stages;
+use planish_core::decompose::assemble;
+use planish_core::mesh::TriangleSoup;
+use planish_core::{repair, shapes};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 

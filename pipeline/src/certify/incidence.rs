@@ -1,7 +1,7 @@
 //! Premise (a): which triangles meet where, from the cells alone.
 
-use crate::buckets::Buckets;
-use crate::id::FaceId;
+use crate::topology::FaceId;
+use crate::topology::csr::Buckets;
 
 /// An arc of the boundary by its nodes: first vertex, middle, second vertex, with its triangle on the left.
 pub(super) type ArcNodes = [u32; 3];

@@ -23,9 +23,9 @@ pub(crate) mod polygons;
 mod star;
 mod straight;
 
-use crate::bernstein::{ExactDet, Validity};
+use crate::fem::bernstein::{ExactDet, Validity};
 use crate::grid::GridPoint;
-use crate::id::FaceId;
+use crate::topology::FaceId;
 pub use arcs::Arc;
 pub use incidence::IncidenceError;
 pub use polygons::Wrong;

@@ -6,7 +6,7 @@
 
 use crate::evaluate::Bvh;
 use crate::grid::{GridPoint, orientation};
-use crate::space::BoundingBox;
+use crate::vec3::BoundingBox;
 
 /// What is wrong with loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

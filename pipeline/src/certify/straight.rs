@@ -7,7 +7,7 @@
 use super::polygons::{self, Wrong};
 use super::{Error, IncidenceError, PlanarMap, incidence, refuse_inexact};
 use crate::grid::{GridPoint, orientation};
-use crate::id::FaceId;
+use crate::topology::FaceId;
 
 /// A map by straight triangles, four between the six nodes of each cell, that is proven to be one-to-one. Made by
 /// [`prove_straight`] only.

@@ -11,10 +11,10 @@
 use super::{MapError, MappedChart, Order, SplitError, map_within};
 use crate::atlas::Chart;
 use crate::decompose;
-use crate::distortion;
-use crate::host::Host;
+use crate::map::natural;
+use crate::measure::distortion;
 use crate::mesh::SurfaceMesh;
-use crate::natural;
+use crate::monitor::Host;
 
 /// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
 /// of a terrain, at 10 to 50, and soccerball_g31, at 80, are well left whole.

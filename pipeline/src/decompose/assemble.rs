@@ -2,8 +2,9 @@
 
 use super::legality::{self, Illegal};
 use crate::atlas::{Atlas, Chart};
-use crate::id::{ChartId, FaceId, HalfEdgeId, VertexId};
-use crate::mesh::{EdgeTable, SurfaceMesh};
+use crate::mesh::SurfaceMesh;
+use crate::topology::EdgeTable;
+use crate::topology::{ChartId, FaceId, HalfEdgeId, VertexId};
 
 /// The atlas in which the triangles of equal label form a chart. Charts are numbered in the order of their first
 /// triangles, whatever the labels.

@@ -11,7 +11,7 @@ use super::network::Network;
 use super::search::Found;
 use super::straighten::{RELAXED, relax};
 use super::voronoi::Cells;
-use crate::host::Cancelled;
+use crate::monitor::Cancelled;
 
 /// A chart is taken to need at most this many more.
 const MOST: f64 = 9.0;

@@ -6,7 +6,7 @@
 
 use super::network::Network;
 use super::voronoi::At;
-use crate::id::HalfEdgeId;
+use crate::topology::HalfEdgeId;
 use std::collections::BinaryHeap;
 
 /// Two vertices of seams are far apart if the way along these is this many times the way across.

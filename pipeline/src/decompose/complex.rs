@@ -9,8 +9,8 @@
 
 use super::dual::Dual;
 use super::voronoi::Cells;
-use crate::id::HalfEdgeId;
-use crate::space::Vec3;
+use crate::topology::HalfEdgeId;
+use crate::vec3::Vec3;
 
 /// No arc, no cell, no corner.
 pub(super) const NONE: u32 = u32::MAX;
@@ -225,11 +225,12 @@ mod tests {
     use crate::decompose::legality;
     use crate::decompose::patches::compact_cells;
     use crate::decompose::regions::Regions;
-    use crate::host::Alone;
-    use crate::id::{ChartId, FaceId, VertexId};
-    use crate::mesh::{Census, EdgeTable, SurfaceMesh, TriangleSoup, Umbrellas};
+    use crate::mesh::{SurfaceMesh, TriangleSoup};
+    use crate::monitor::Alone;
     use crate::repair::{Settings, repair};
     use crate::shapes::{self, Random};
+    use crate::topology::{Census, EdgeTable, Umbrellas};
+    use crate::topology::{ChartId, FaceId, VertexId};
 
     fn surface(soup: &TriangleSoup) -> SurfaceMesh {
         repair(soup, &Settings::default()).expect("a surface is left").mesh

@@ -1,10 +1,10 @@
 //! The dual graph of a surface: triangles, joined where they share an edge along which both run consistently.
 
 use super::voronoi::Graph;
-use crate::host::{Cancelled, Host, Pace};
-use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;
-use crate::space::{Vec3, cross, distance, midpoint, sub};
+use crate::monitor::{Cancelled, Host, Pace};
+use crate::topology::{FaceId, HalfEdgeId, VertexId};
+use crate::vec3::{Vec3, cross, distance, midpoint, sub};
 use std::collections::BTreeMap;
 
 const NONE: HalfEdgeId = HalfEdgeId(u32::MAX);

@@ -7,9 +7,10 @@
 use super::assemble::assemble;
 use super::legality::Illegal;
 use crate::atlas::Atlas;
-use crate::id::{FaceId, HalfEdgeId, VertexId};
-use crate::mesh::{EdgeTable, SurfaceMesh, TriangleShape};
-use crate::space::midpoint;
+use crate::mesh::{SurfaceMesh, TriangleShape};
+use crate::topology::EdgeTable;
+use crate::topology::{FaceId, HalfEdgeId, VertexId};
+use crate::vec3::midpoint;
 
 /// A surface whose ears are split.
 #[derive(Clone, Debug)]
@@ -145,8 +146,8 @@ impl Work {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::host::Alone;
     use crate::mesh::TriangleSoup;
+    use crate::monitor::Alone;
     use crate::{Order, decompose, finish_chart, map_chart, repair};
 
     /// A square of n x n smaller ones, all cut along the same diagonal: two of its corners are ears.

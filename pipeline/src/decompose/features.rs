@@ -10,11 +10,11 @@
 
 use super::Settings;
 use super::dual::Dual;
-use crate::host::{Cancelled, Host};
-use crate::id::{FaceId, HalfEdgeId};
 use crate::mesh::SurfaceMesh;
-use crate::space::{Vec3, dot, norm};
-use crate::union_find::UnionFind;
+use crate::monitor::{Cancelled, Host};
+use crate::topology::union_find::UnionFind;
+use crate::topology::{FaceId, HalfEdgeId};
+use crate::vec3::{Vec3, dot, norm};
 
 /// The lower threshold, as a share of the upper one: 25 of 40 degrees.
 const LOWER: f64 = 0.625;

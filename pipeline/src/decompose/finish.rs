@@ -11,7 +11,7 @@ use super::straighten::{RELAXED, relax, round_off, straighten};
 use super::voronoi::Cells;
 use super::{Error, Settings};
 use crate::atlas::Atlas;
-use crate::id::{EdgeId, HalfEdgeId};
+use crate::topology::{EdgeId, HalfEdgeId};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and

@@ -10,7 +10,7 @@ use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
 use super::regions::Regions;
 use super::voronoi::Cells;
 use crate::atlas::Atlas;
-use crate::id::HalfEdgeId;
+use crate::topology::HalfEdgeId;
 
 /// The prediction for a chart.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,7 @@
 
 use super::network::Network;
 use super::regions::Shape;
-use crate::id::{FaceId, HalfEdgeId};
+use crate::topology::{FaceId, HalfEdgeId};
 
 /// A path along edges: half-edges from end to end, with the label that shall lie on its left and on its right.
 #[derive(Clone, Debug)]
@@ -182,7 +182,7 @@ mod tests {
     use crate::decompose::merge::Limits;
     use crate::decompose::patches::compact_cells;
     use crate::decompose::shortest::{Bounds, Goal, Tree};
-    use crate::host::Alone;
+    use crate::monitor::Alone;
     use crate::repair::{Settings, repair};
     use crate::shapes::{self, Random};
 

@@ -1,7 +1,7 @@
 //! What a chart must be: connected, oriented, of genus 0, with simple boundary loops that share no vertex.
 
-use crate::id::{ChartId, EdgeId, HalfEdgeId, VertexId};
-use crate::mesh::{EdgeTable, count_components};
+use crate::topology::{ChartId, EdgeId, HalfEdgeId, VertexId};
+use crate::topology::{EdgeTable, count_components};
 
 /// Why a set of triangles is no chart.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -81,7 +81,7 @@ pub fn verify(chart: ChartId, triangles: &[[VertexId; 3]], edges: &EdgeTable, ve
 /// A vertex at which sheets touch that share no edge there: more umbrellas than the boundary half-edges out of it
 /// account for.
 fn touched(triangles: &[[VertexId; 3]], edges: &EdgeTable, vertices: usize) -> Option<VertexId> {
-    let umbrellas = crate::mesh::Umbrellas::new(triangles, edges);
+    let umbrellas = crate::topology::Umbrellas::new(triangles, edges);
     let mut seen = vec![false; vertices];
     umbrellas.vertices(triangles).into_iter().find(|v| std::mem::replace(&mut seen[v.index()], true))
 }

@@ -3,8 +3,8 @@
 
 use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
 use super::regions::{Regions, Shape, Union};
-use crate::host::{Cancelled, Pace};
-use crate::space::norm;
+use crate::monitor::{Cancelled, Pace};
+use crate::vec3::norm;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f64::consts::PI;

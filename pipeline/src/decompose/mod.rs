@@ -43,9 +43,9 @@ mod straighten;
 mod voronoi;
 
 use crate::atlas::Atlas;
-use crate::host::{Cancelled, Host};
-use crate::id::HalfEdgeId;
 use crate::mesh::SurfaceMesh;
+use crate::monitor::{Cancelled, Host};
+use crate::topology::HalfEdgeId;
 pub use assemble::assemble;
 use choice::Choice;
 use complex::Complex;
@@ -82,7 +82,7 @@ impl From<Cancelled> for Error {
 /// What charts must respect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// The largest area ratio of a chart (see [`crate::distortion::Summary::area_ratio`]). At least 10; default 1e6.
+    /// The largest area ratio of a chart (see [`crate::measure::distortion::Summary::area_ratio`]). At least 10; default 1e6.
     pub max_area_ratio: f64,
     /// The largest number of triangles of a chart; default none.
     pub max_triangles: usize,

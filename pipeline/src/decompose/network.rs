@@ -4,8 +4,8 @@
 
 use super::dual::Dual;
 use super::merge::Limits;
-use crate::id::HalfEdgeId;
-use crate::union_find::UnionFind;
+use crate::topology::HalfEdgeId;
+use crate::topology::union_find::UnionFind;
 
 /// A chart keeps at least this share of its area in a step of straightening.
 pub(super) const LEAST: f64 = 0.5;

@@ -6,7 +6,7 @@
 //! all seeds, and are as exact as if seeds had been chosen among nodes.
 
 use super::voronoi::{Cells, Graph, nearest, seeds};
-use crate::host::{Cancelled, Pace};
+use crate::monitor::{Cancelled, Pace};
 
 /// Patches to a cell.
 const SAMPLES: usize = 16;
@@ -139,8 +139,8 @@ mod tests {
     use super::*;
     use crate::decompose::dual::Dual;
     use crate::decompose::voronoi::farthest_first;
-    use crate::host::Alone;
     use crate::mesh::TriangleSoup;
+    use crate::monitor::Alone;
     use crate::repair::{Settings, repair};
     use crate::shapes;
 

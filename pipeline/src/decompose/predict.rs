@@ -8,8 +8,8 @@
 use super::complex::{Complex, NONE};
 use super::ldl::Springs;
 use super::voronoi::Graph;
-use crate::distortion::quantiles;
-use crate::space::{Vec3, distance};
+use crate::measure::distortion::quantiles;
+use crate::vec3::{Vec3, distance};
 use std::f64::consts::TAU;
 
 /// The graph of cells.

@@ -5,7 +5,7 @@
 //! judged at the cost of its boundary, not of its area, and whatever the number of triangles.
 
 use super::complex::{Complex, NONE};
-use crate::space::Vec3;
+use crate::vec3::Vec3;
 
 /// What is known of a region.
 #[derive(Clone, Debug, Default)]

@@ -10,7 +10,7 @@ use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
 use super::regions::{Outline, Region, Regions};
 use super::sides::{Axes, axes, faces};
 use super::voronoi::{Cells, bisect_until, farthest_first};
-use crate::host::{Cancelled, Pace};
+use crate::monitor::{Cancelled, Pace};
 
 const BALANCED: Weights = Weights { ratio: 1.0, roundness: 0.6, spread: 0.5, shared: 0.0 };
 const COMPACT: Weights = Weights { ratio: 0.5, roundness: 0.6, spread: 0.5, shared: 1.0 };

@@ -3,8 +3,8 @@
 use super::dual::Dual;
 use super::network::Network;
 use super::voronoi::At;
-use crate::id::HalfEdgeId;
-use crate::space::distance;
+use crate::topology::HalfEdgeId;
+use crate::vec3::distance;
 use std::collections::BinaryHeap;
 
 /// An edge along a feature is as long as this share of it.
@@ -227,7 +227,7 @@ impl Bounds<'_> {
 mod tests {
     use super::*;
     use crate::decompose::merge::Limits;
-    use crate::host::Alone;
+    use crate::monitor::Alone;
     use crate::repair::{Settings, repair};
     use crate::shapes::{self, Random};
 

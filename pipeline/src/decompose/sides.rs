@@ -7,7 +7,7 @@
 use super::complex::Complex;
 use super::regions::Region;
 use super::voronoi::Cells;
-use crate::space::{Vec3, dot};
+use crate::vec3::{Vec3, dot};
 
 /// Three axes at right angles, the one along which normals are spread most first.
 pub(super) type Axes = [Vec3; 3];

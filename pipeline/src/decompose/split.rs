@@ -12,10 +12,10 @@ use super::regions::Regions;
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
-use crate::host::Host;
-use crate::id::{FaceId, HalfEdgeId, VertexId};
 use crate::mesh::SurfaceMesh;
-use crate::union_find::UnionFind;
+use crate::monitor::Host;
+use crate::topology::union_find::UnionFind;
+use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
 /// Where to cut, as shares of the range of the logarithm of the area scale: the middle first.
 const LEVELS: [f64; 9] = [0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7];

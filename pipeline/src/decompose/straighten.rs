@@ -10,7 +10,7 @@ use super::lay::Path;
 use super::network::Network;
 use super::shortest::{Bounds, Goal, Tree, length, reversed, weight};
 use super::voronoi::At;
-use crate::id::HalfEdgeId;
+use crate::topology::HalfEdgeId;
 use std::collections::{BTreeSet, BinaryHeap};
 
 /// Rounds over all seams and corners, and the share of the length that makes another one worth while.

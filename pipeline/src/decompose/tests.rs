@@ -1,7 +1,7 @@
 use super::*;
-use crate::host::Alone;
-use crate::id::VertexId;
 use crate::mesh::TriangleSoup;
+use crate::monitor::Alone;
+use crate::topology::VertexId;
 use crate::{Order, finish_chart, finish_or_split, map_or_split, repair, shapes};
 
 fn surface(soup: &TriangleSoup) -> SurfaceMesh {
@@ -19,7 +19,7 @@ fn atlas(soup: &TriangleSoup, settings: &Settings) -> Atlas {
     faces.sort_unstable();
     assert_eq!(
         faces,
-        (0..mesh.triangles().len()).map(crate::id::FaceId::at).collect::<Vec<_>>(),
+        (0..mesh.triangles().len()).map(crate::topology::FaceId::at).collect::<Vec<_>>(),
         "every triangle once"
     );
     atlas
@@ -132,7 +132,7 @@ fn what_stretches_too_much_is_split_until_it_does_not() {
         let finish =
             |(chart, mapped)| finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings, &Alone).expect("maps");
         for (chart, done) in parts.into_iter().flat_map(finish) {
-            let ratio = crate::distortion::area_ratio(&chart, &done.certified);
+            let ratio = crate::measure::distortion::area_ratio(&chart, &done.certified);
             assert!(ratio <= max_area_ratio, "{ratio} > {max_area_ratio}");
         }
     }
@@ -150,7 +150,7 @@ fn prediction_agrees_with_the_map_within_a_decade() {
         let predicted = judge::judge(&network, &cells)[0].expect("a chart").ratio;
         let chart = assemble(&mesh, &network.labels).expect("a disk").into_charts().remove(0);
         let done = finish_chart(crate::map_chart(&chart, Order::Linear).expect("maps"));
-        let measured = crate::distortion::area_ratio(&chart, &done.certified);
+        let measured = crate::measure::distortion::area_ratio(&chart, &done.certified);
         assert!((predicted / measured).log10().abs() < 1.0, "length {length}: {predicted:.1e}, {measured:.1e}");
     }
 }

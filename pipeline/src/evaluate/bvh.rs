@@ -5,7 +5,7 @@
 //! 10.1111/j.1467-8659.2009.01377.x), down to a few in a leaf. Building takes one sort, a query O(log n + found) on surfaces.
 //! The hierarchy depends on the boxes and their order alone.
 
-use crate::space::{BoundingBox, Vec3};
+use crate::vec3::{BoundingBox, Vec3};
 
 /// So many items are looked at one by one: below it, boxes cost more than they save.
 const LEAF: usize = 4;

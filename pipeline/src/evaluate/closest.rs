@@ -1,6 +1,6 @@
 //! The point of a triangle or of a segment that is closest to another one.
 
-use crate::space::{Vec3, cross, dot, sub};
+use crate::vec3::{Vec3, cross, dot, sub};
 
 /// A point of a triangle by its barycentric coordinates, which are at least 0 and add up to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]

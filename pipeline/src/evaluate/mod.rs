@@ -18,7 +18,7 @@ pub use bvh::{Bvh, along_curve};
 pub use closest::{OnTriangle, on_segment, on_triangle};
 pub use plane::Plane;
 
-use crate::space::{BoundingBox, Vec3};
+use crate::vec3::{BoundingBox, Vec3};
 use std::sync::OnceLock;
 
 /// A triangulation in space and in the plane, searched by either.

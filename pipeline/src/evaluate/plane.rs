@@ -1,7 +1,7 @@
 //! The plane of a flat triangulation, which is a map of it as good as any other.
 
 use crate::grid::{GridPoint, orientation};
-use crate::space::{Vec3, cross, dot, norm, sub, unit_scale};
+use crate::vec3::{Vec3, cross, dot, norm, sub, unit_scale};
 
 /// A triangulation is flat where no node is further from its plane than this, relative to its extent.
 const FLAT: f64 = 1e-9;

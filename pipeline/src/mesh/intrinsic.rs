@@ -4,7 +4,7 @@
 //! not at all, the same small number is added to every edge of the surface ("mollification", Sharp and Crane
 //! 2020, doi 10.1111/cgf.14069, section 4.5), so that every triangle has a positive area.
 
-use crate::space::{Vec3, distance, triangle_area};
+use crate::vec3::{Vec3, distance, triangle_area};
 
 /// The slack that every triangle inequality gets, relative to the mean edge length.
 const SLACK: f64 = 1e-8;

@@ -1,7 +1,7 @@
 //! A coordinate far from all others: what stands for "no data" in grids of heights (-9999, -32768, 1e20).
 
 use super::SurfaceMesh;
-use crate::space::Vec3;
+use crate::vec3::Vec3;
 
 /// A value is apart if it is farther from the others than this many times their range.
 const FAR: f64 = 10.0;

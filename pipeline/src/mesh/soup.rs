@@ -3,7 +3,7 @@
 //! Files hold points that no triangle uses, and what such a point has for coordinates is no defect of the surface: it
 //! refuses nothing, and stands somewhere else instead, see [`TriangleSoup::new`].
 
-use crate::space::Vec3;
+use crate::vec3::Vec3;
 
 /// Coordinates beyond this are refused: their squares would overflow.
 const LARGEST: f64 = 1e100;

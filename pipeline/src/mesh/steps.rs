@@ -6,7 +6,7 @@
 //! that lie in wider steps (whole numbers, a grid) lost nothing.
 
 use super::SurfaceMesh;
-use crate::space::{Vec3, distance};
+use crate::vec3::{Vec3, distance};
 
 /// Edges below this many steps are short: the direction of one of four steps is known to 1 in 4 at best.
 pub const FEW_STEPS: f64 = 4.0;

@@ -1,9 +1,10 @@
 //! A repaired surface.
 
-use super::{Census, EdgeTable, Metric};
+use super::Metric;
 use crate::atlas::Chart;
-use crate::id::VertexId;
-use crate::space::{BoundingBox, Vec3, triangle_area};
+use crate::topology::VertexId;
+use crate::topology::{Census, EdgeTable};
+use crate::vec3::{BoundingBox, Vec3, triangle_area};
 
 /// A triangulated surface after repair: no triangle repeats a vertex or another triangle, orientable components
 /// are oriented, and every sheet that met others at non-manifold edges or vertices has vertices of its own. Made by

@@ -8,10 +8,10 @@
 //! from ends that are joined already.
 
 use super::open_half_edges;
-use crate::id::{HalfEdgeId, VertexId};
-use crate::mesh::EdgeTable;
-use crate::space::{Vec3, distance, dot, midpoint, norm, sub};
-use crate::union_find::UnionFind;
+use crate::topology::EdgeTable;
+use crate::topology::union_find::UnionFind;
+use crate::topology::{HalfEdgeId, VertexId};
+use crate::vec3::{Vec3, distance, dot, midpoint, norm, sub};
 
 /// Triangles on the same side of an edge within this angle (10 degrees) face each other: the cosine.
 pub(super) const FACING: f64 = 0.985;

@@ -19,9 +19,10 @@ mod near;
 mod t_junctions;
 pub(crate) mod weld;
 
-use crate::id::{FaceId, HalfEdgeId, VertexId};
-use crate::mesh::{Census, EdgeTable, Metric, SurfaceMesh, TriangleSoup, Umbrellas};
-use crate::space::{BoundingBox, Vec3, midpoint, unit_scale};
+use crate::mesh::{Metric, SurfaceMesh, TriangleSoup};
+use crate::topology::{Census, EdgeTable, Umbrellas};
+use crate::topology::{FaceId, HalfEdgeId, VertexId};
+use crate::vec3::{BoundingBox, Vec3, midpoint, unit_scale};
 use t_junctions::Boundary;
 
 /// What repair may do.
@@ -366,7 +367,7 @@ impl Draft {
 
     /// Orients each orientable component like the majority of its triangles (the first one, in a tie).
     fn orient(&mut self, edges: &EdgeTable) -> Found {
-        let found = crate::mesh::orientation(&self.triangles, edges);
+        let found = crate::topology::orientation(&self.triangles, edges);
         let mut balance = vec![0_i64; found.orientable.len()];
         for (c, flip) in found.component.iter().zip(&found.flip) {
             balance[*c as usize] += if *flip { -1 } else { 1 };

@@ -1,6 +1,6 @@
 //! Points near a segment: a k-d tree (Bentley 1975, doi 10.1145/361002.361007).
 
-use crate::space::{BoundingBox, Vec3, sub};
+use crate::vec3::{BoundingBox, Vec3, sub};
 
 /// Points of a leaf, at most.
 const LEAF: usize = 8;

@@ -23,10 +23,10 @@
 use super::cracks::FACING;
 use super::near::PointTree;
 use super::open_half_edges;
-use crate::buckets::Buckets;
-use crate::id::{HalfEdgeId, VertexId};
-use crate::mesh::EdgeTable;
-use crate::space::{Vec3, cross, dot, norm, sub};
+use crate::topology::EdgeTable;
+use crate::topology::csr::Buckets;
+use crate::topology::{HalfEdgeId, VertexId};
+use crate::vec3::{Vec3, cross, dot, norm, sub};
 
 /// The least tolerance, as a share of the largest coordinate: four units in the last place.
 pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;

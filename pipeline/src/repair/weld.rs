@@ -1,9 +1,9 @@
 //! Merging bit-equal vertices.
 
 use super::Draft;
-use crate::id::VertexId;
 use crate::mesh::TriangleSoup;
-use crate::space::{Vec3, bits_of};
+use crate::topology::VertexId;
+use crate::vec3::{Vec3, bits_of};
 
 /// Places of the table that are looked at per point, on average and at most.
 const LOOKS: usize = 8;

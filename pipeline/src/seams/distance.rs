@@ -1,9 +1,9 @@
 //! How close different seams of a chart come to each other.
 
 use super::{Curve, SeamNetwork};
-use crate::id::ChartId;
 use crate::mesh::SurfaceMesh;
-use crate::space::{BoundingBox, Vec3, dot, sub};
+use crate::topology::ChartId;
+use crate::vec3::{BoundingBox, Vec3, dot, sub};
 
 impl SeamNetwork {
     /// The shortest distance in space between two seams beside one chart that share no end, in the unit of the
@@ -14,7 +14,7 @@ impl SeamNetwork {
     /// boxes around their halves).
     pub fn shortest_distance(&self, mesh: &SurfaceMesh) -> Option<f64> {
         let scale = mesh.metric().scale;
-        let place = |v: &crate::id::VertexId| mesh.points()[v.index()].map(|c| c * scale);
+        let place = |v: &crate::topology::VertexId| mesh.points()[v.index()].map(|c| c * scale);
         let polyline = |c: &Curve| Polyline::new(c.vertices().iter().map(place).collect());
         let polylines: Vec<Polyline> = self.curves().iter().map(polyline).collect();
         let mut squared = f64::INFINITY;

@@ -8,7 +8,7 @@
 use super::Boundary;
 use crate::atlas::Chart;
 use crate::mesh::SurfaceMesh;
-use crate::space::{Vec3, cross, distance, dot, norm, sub};
+use crate::vec3::{Vec3, cross, distance, dot, norm, sub};
 
 /// An edge is sharp, and a curve turns sharply, from here on: the default of `feature-angle`.
 const SHARP: f64 = 40.0;

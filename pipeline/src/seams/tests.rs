@@ -2,7 +2,7 @@ use super::*;
 use crate::atlas::Atlas;
 use crate::decompose::assemble;
 use crate::mesh::TriangleSoup;
-use crate::space::Vec3;
+use crate::vec3::Vec3;
 use crate::{repair, shapes};
 
 /// The atlas of a soup in which each triangle is labelled by its centre.

@@ -15,8 +15,8 @@ use super::{Defect, SurfaceDistance};
 use crate::certify::polygons::{self, Wrong};
 use crate::evaluate::{Plane, along_curve};
 use crate::grid::{GridPoint, orientation};
-use crate::id::{ChartId, VertexId};
-use crate::space::{Vec3, bits_of, unit_scale};
+use crate::topology::{ChartId, VertexId};
+use crate::vec3::{Vec3, bits_of, unit_scale};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 

@@ -8,8 +8,8 @@ use super::Defect;
 use super::open::sides_of_one;
 use super::reference::{HandedOverAtlas, Mesh};
 use crate::evaluate::{Bvh, on_segment};
-use crate::id::{ChartId, CurveId, VertexId};
-use crate::space::{BoundingBox, Vec3, distance};
+use crate::topology::{ChartId, CurveId, VertexId};
+use crate::vec3::{BoundingBox, Vec3, distance};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Where a node lies on a curve: the side of the polyline, and the share of it.
@@ -132,7 +132,7 @@ fn expected(mesh: &Mesh, k: u32, curve: &[Vec3], nodes: &[(OnCurve, VertexId)], 
 /// What is missing among the open edges of a chart, curve by curve, and what is too much.
 fn compare(mesh: &Mesh, chart: ChartId, open: &[[VertexId; 2]], curves: Vec<(u32, &[Edge])>) -> Vec<Defect> {
     let points = &mesh.triangulation.points;
-    let middle = |[a, b]: &Edge| crate::space::midpoint(points[a.index()], points[b.index()]);
+    let middle = |[a, b]: &Edge| crate::vec3::midpoint(points[a.index()], points[b.index()]);
     let found: BTreeSet<Edge> = open.iter().map(|e| ordered(*e)).collect();
     let mut accounted: BTreeSet<Edge> = BTreeSet::new();
     let mut defects = Vec::new();

@@ -2,8 +2,8 @@
 
 use super::reference::Triangulation;
 use crate::evaluate::{Bvh, nearest};
-use crate::id::VertexId;
-use crate::space::Vec3;
+use crate::topology::VertexId;
+use crate::vec3::Vec3;
 
 /// So many points of the surface are compared with the mesh at most.
 const SAMPLES: f64 = 15_000.0;

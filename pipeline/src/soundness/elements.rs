@@ -1,8 +1,8 @@
 //! Are elements fine? Their shape, their size, and whether curved ones are valid.
 
 use super::reference::{Mesh, Triangulation};
-use crate::id::VertexId;
-use crate::space::{Vec3, cross, distance, dot, norm, sub};
+use crate::topology::VertexId;
+use crate::vec3::{Vec3, cross, distance, dot, norm, sub};
 
 /// A vertex of the surface where its angles add up to less than a right angle is a tip: no mesh has good elements there.
 const TIP: f64 = std::f64::consts::FRAC_PI_2;
@@ -110,7 +110,7 @@ pub fn invalid_curved(mesh: &Mesh) -> Vec<u32> {
 
 /// Whether the element turns the way of its straight triangle everywhere: the determinant of its projection on the plane
 /// of that triangle, a quadratic polynomial, is positive. Its six Bernstein coefficients are those of
-/// [`crate::bernstein`], here in doubles; halving (Johnen, Remacle and Geuzaine 2013, doi 10.1016/j.jcp.2012.08.051)
+/// [`crate::fem::bernstein`], here in doubles; halving (Johnen, Remacle and Geuzaine 2013, doi 10.1016/j.jcp.2012.08.051)
 /// decides where they have both signs, at most [`HALVINGS`] times: what is then undecided is not called valid.
 fn is_valid(corners: [Vec3; 3], mids: [Vec3; 3]) -> bool {
     let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));

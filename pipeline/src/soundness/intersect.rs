@@ -9,7 +9,7 @@
 use super::reference::Triangulation;
 use crate::evaluate::{Bvh, box_around, larger, on_triangle};
 use crate::seams::segment_distance;
-use crate::space::{BoundingBox, Vec3, cross, dot, sub};
+use crate::vec3::{BoundingBox, Vec3, cross, dot, sub};
 
 /// The error of the volume of six doubles, relative to the sum of the absolute values of its terms.
 const ROUNDING: f64 = 8e-16;

@@ -28,10 +28,10 @@ pub use elements::{EdgeLengths, gamma};
 pub use reference::{HandedOverAtlas, HandedOverChart, Mesh, Triangulation};
 pub use topology::Invariants;
 
-use crate::buckets::Buckets;
-use crate::id::{ChartId, CurveId, VertexId};
-use crate::mesh::EdgeTable;
-use crate::space::Vec3;
+use crate::topology::EdgeTable;
+use crate::topology::csr::Buckets;
+use crate::topology::{ChartId, CurveId, VertexId};
+use crate::vec3::Vec3;
 use covering::InPlane;
 use distance::{SurfaceDistance, uncovered};
 

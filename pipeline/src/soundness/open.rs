@@ -1,6 +1,6 @@
 //! The sides that only one triangle has.
 
-use crate::buckets::Buckets;
+use crate::topology::csr::Buckets;
 
 /// A side by its lower node: the group of the triangle, the upper node, and whether the side runs upward.
 type Side = (u32, (u32, u32, bool));

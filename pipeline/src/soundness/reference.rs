@@ -1,9 +1,9 @@
 //! What a mesh is held against: the certified surface, and the maps that the mesher used. And the mesh.
 
 use crate::evaluate::{Bvh, LinearMap, triangle_bvh};
-use crate::id::VertexId;
 use crate::repair::weld::distinct;
-use crate::space::{BoundingBox, Vec3, triangle_area};
+use crate::topology::VertexId;
+use crate::vec3::{BoundingBox, Vec3, triangle_area};
 
 /// A triangulated surface or mesh whose points are all different.
 #[derive(Clone, Debug, Default)]

@@ -1,8 +1,8 @@
 use super::*;
-use crate::id::VertexId;
 use crate::seams::SeamNetwork;
 use crate::seams::tests::{labelled, sector};
 use crate::subdivide::subdivide;
+use crate::topology::VertexId;
 use crate::{Order, finish_chart, map_chart, shapes};
 
 /// A surface with its atlas as a mesher gets it, and the best of all meshes: the surface itself.
@@ -241,7 +241,7 @@ fn elements_of_six_nodes_are_held_against_surface_and_validity() {
         let points = &mut mesh.triangulation.points;
         mesh.mids[triangle] = Some([0, 1, 2].map(|k| {
             let [p, q] = [k, (k + 1) % 3].map(|i| points[corners[i].index()]);
-            let middle = crate::space::midpoint(p, q);
+            let middle = crate::vec3::midpoint(p, q);
             points.push([0, 1, 2].map(|i| middle[i] + push[i]));
             VertexId::at(points.len() - 1)
         }));

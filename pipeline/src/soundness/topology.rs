@@ -1,9 +1,9 @@
 //! The numbers that no remeshing may change.
 
 use super::Defect;
-use crate::id::VertexId;
-use crate::mesh::EdgeTable;
-use crate::union_find::UnionFind;
+use crate::topology::EdgeTable;
+use crate::topology::VertexId;
+use crate::topology::union_find::UnionFind;
 
 /// Numbers of a triangulation that are those of every other one of the same surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

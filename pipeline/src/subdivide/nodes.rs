@@ -1,11 +1,11 @@
 //! The nodes that the charts of a surface share: vertices, middles of edges, and middles of parts of these.
 
 use crate::atlas::Chart;
-use crate::curvature::{self, Principal};
-use crate::id::{EdgeId, FaceId, HalfEdgeId, VertexId};
+use crate::measure::curvature::{self, Principal};
 use crate::mesh::SurfaceMesh;
 use crate::seams::{Curve, SeamNetwork};
-use crate::space::{Vec3, midpoint};
+use crate::topology::{EdgeId, FaceId, HalfEdgeId, VertexId};
+use crate::vec3::{Vec3, midpoint};
 use std::collections::BTreeMap;
 
 /// Nodes are numbered: vertices of the surface, middles of its edges, middles of parts of edges. Copies of a vertex

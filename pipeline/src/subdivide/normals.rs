@@ -1,8 +1,8 @@
 //! Triangles whose normal in space, computed in doubles, is exactly zero: one of their nodes moves.
 
 use super::{Error, LinearChart};
-use crate::id::{ChartId, FaceId};
-use crate::space::{Vec3, cross, dot, sub};
+use crate::topology::{ChartId, FaceId};
+use crate::vec3::{Vec3, cross, dot, sub};
 
 /// How far a node moves, relative to the diagonal of the bounding box.
 const STEP: f64 = 1e-12;

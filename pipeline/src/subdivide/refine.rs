@@ -20,8 +20,8 @@ use super::{Inverted, LinearChart};
 use crate::atlas::Chart;
 use crate::certify::PlanarMap;
 use crate::grid::{GridPoint, orientation};
-use crate::id::{ChartId, FaceId, HalfEdgeId};
 use crate::mesh::SurfaceMesh;
+use crate::topology::{ChartId, FaceId, HalfEdgeId};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How often the four parts of a triangle may be split again.

@@ -3,7 +3,7 @@ use crate::atlas::Atlas;
 use crate::certify::{PlanarMap, prove};
 use crate::mesh::TriangleSoup;
 use crate::seams::tests::{labelled, sector};
-use crate::space::distance;
+use crate::vec3::distance;
 use crate::{Order, finish_chart, map_chart, shapes};
 
 /// A surface with one chart per label, and their maps.
@@ -111,14 +111,15 @@ fn a_chart_is_handed_over_by_its_projection_where_there_is_one() {
     let flat = TriangleSoup::new(flat, plate.triangles().to_vec()).expect("sound");
     let mut sample = Sample::new(&flat, |p| u32::from(p[0] > 0.1));
     let charts = sample.atlas.charts();
-    sample.straight = charts.iter().map(|c| crate::natural::projection(&sample.mesh, c, 4.0).map(|p| p.map)).collect();
+    sample.straight =
+        charts.iter().map(|c| crate::map::natural::projection(&sample.mesh, c, 4.0).map(|p| p.map)).collect();
     let linear = sample.verified();
     assert_eq!((linear.straight_charts().len(), linear.refined()), (sample.atlas.charts().len(), 0));
     for chart in linear.charts() {
         let scale = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|n| chart.uv()[n as usize]);
             let corners = t.map(|n| linear.points()[chart.nodes()[n as usize] as usize]);
-            orientation(a, b, c) as f64 / crate::space::triangle_area(corners)
+            orientation(a, b, c) as f64 / crate::vec3::triangle_area(corners)
         };
         let first = scale(&chart.triangles()[0]);
         assert!(chart.triangles().iter().all(|t| (scale(t) / first - 1.0).abs() < 1e-9), "the plane as it is");
@@ -227,7 +228,7 @@ fn triangles_without_a_normal_get_one_and_others_stay() {
     assert!(linear.moved() > 0);
     let corners = |c: &LinearChart, t: [u32; 3]| t.map(|n| linear.points()[c.nodes()[n as usize] as usize]);
     for chart in linear.charts() {
-        assert!(chart.triangles().iter().all(|t| crate::space::triangle_area(corners(chart, *t)) > 0.0));
+        assert!(chart.triangles().iter().all(|t| crate::vec3::triangle_area(corners(chart, *t)) > 0.0));
     }
     let furthest = strip.mesh.points().iter().zip(linear.points()).map(|(p, q)| distance(*p, *q)).fold(0.0, f64::max);
     assert!(furthest <= 32.0 * 1e-12 * strip.mesh.bounding_box().diagonal(), "{furthest}");
@@ -244,7 +245,7 @@ fn flat_quartered_parts(sample: &Sample) -> usize {
     let chart = quartered(&sample.mesh, &sample.atlas.charts()[0], sample.maps[0].certified.map(), &nodes);
     let points = nodes.positions(&sample.mesh);
     let corners = |t: &[u32; 3]| t.map(|n| points[chart.nodes[n as usize] as usize]);
-    chart.triangles.iter().filter(|t| crate::space::triangle_area(corners(t)) == 0.0).count()
+    chart.triangles.iter().filter(|t| crate::vec3::triangle_area(corners(t)) == 0.0).count()
 }
 
 #[test]
@@ -259,7 +260,7 @@ fn a_moved_node_is_moved_far_from_the_origin_too() {
     let mut points = vec![[1e7, 1e7, 1e7], [1e7 + 1.0, 1e7, 1e7], [1e7 + 0.5, 1e7, 1e7]];
     let chart = LinearChart { nodes: vec![0, 1, 2], triangles: vec![[0, 1, 2]], faces: vec![0], ..Default::default() };
     assert_eq!(normals::separate(&mut points, &[chart], 1.0), Ok(1));
-    assert!(crate::space::triangle_area([points[0], points[1], points[2]]) > 0.0);
+    assert!(crate::vec3::triangle_area([points[0], points[1], points[2]]) > 0.0);
 }
 
 #[test]

@@ -4,11 +4,11 @@ use super::newton::minimise;
 use super::penalty::{Bound, Penalty};
 use super::problem::{Cell, Problem};
 use super::{Effort, on_grid, places, region};
-use crate::closed::ClosedChart;
+use crate::fem::sparse::Error;
 use crate::grid::GridPoint;
-use crate::host::Pace;
-use crate::quadratic::energies;
-use crate::sparse::Error;
+use crate::map::closed::ClosedChart;
+use crate::map::quadratic::energies;
+use crate::monitor::Pace;
 
 /// The weights of the barrier, relative to the energy of each triangle.
 const WEIGHTS: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];

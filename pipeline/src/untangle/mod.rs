@@ -27,10 +27,10 @@ mod region;
 mod terms;
 
 use crate::certify::{Arc, star_centre};
-use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
-use crate::host::{Host, Pace};
-use crate::quadratic::{self, QuadraticMap, energy, invalid_triangles};
+use crate::map::closed::ClosedChart;
+use crate::map::quadratic::{self, QuadraticMap, energy, invalid_triangles};
+use crate::monitor::{Host, Pace};
 use problem::Places;
 
 /// Above this share of invalid triangles the feasible path is taken at once.
@@ -162,7 +162,7 @@ fn centre_of_hole(chart: &ClosedChart, nodes: &[GridPoint], k: usize) -> Option<
     star_centre(&arcs, nodes[chart.centre_node(k)])
 }
 
-fn arc(chart: &ClosedChart, nodes: &[GridPoint], h: crate::id::HalfEdgeId) -> Arc {
+fn arc(chart: &ClosedChart, nodes: &[GridPoint], h: crate::topology::HalfEdgeId) -> Arc {
     let [from, to] = chart.ends(h).map(|v| nodes[chart.vertex_node(v)]);
     Arc { from, mid: nodes[chart.mid_node(h)], to }
 }

@@ -2,7 +2,7 @@
 
 use super::penalty::Penalty;
 use super::problem::{Places, Problem, newton_step};
-use crate::sparse::{Analysis, Error, Pattern};
+use crate::fem::sparse::{Analysis, Error, Pattern};
 
 /// The share of the way to the nearest floor that one step may go.
 const SAFE: f64 = 0.95;

@@ -9,13 +9,13 @@ use super::penalty::{Bound, Penalty};
 use super::problem::{Cell, Places, Problem};
 use super::region;
 use super::{Effort, arc, centre_of_hole, places, terms};
-use crate::bernstein::{ExactDet, Validity};
-use crate::closed::ClosedChart;
+use crate::fem::bernstein::{ExactDet, Validity};
 use crate::grid::GridPoint;
-use crate::host::Pace;
-use crate::id::{HalfEdgeId, VertexId};
-use crate::mesh::Stars;
-use crate::quadratic::{QuadraticMap, det, invalid_triangles, node_to_grid};
+use crate::map::closed::ClosedChart;
+use crate::map::quadratic::{QuadraticMap, det, invalid_triangles, node_to_grid};
+use crate::monitor::Pace;
+use crate::topology::Stars;
+use crate::topology::{HalfEdgeId, VertexId};
 
 /// Rings around invalid triangles, one attempt after another.
 const RINGS: [usize; 5] = [2, 4, 7, 12, 20];

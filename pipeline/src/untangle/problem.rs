@@ -2,11 +2,11 @@
 
 use super::penalty::{Bound, Penalty, Value};
 use super::terms::{self, Form, Four};
-use crate::closed::ClosedChart;
-use crate::element;
-use crate::host::{Cancelled, Pace};
-use crate::jacobian::{Corners, Six};
-use crate::sparse::{Analysis, Error, PRESCRIBED, Pattern};
+use crate::fem::element;
+use crate::fem::jacobian::{Corners, Six};
+use crate::fem::sparse::{Analysis, Error, PRESCRIBED, Pattern};
+use crate::map::closed::ClosedChart;
+use crate::monitor::{Cancelled, Pace};
 
 /// The work of a triangle: as long as so many are looked at elsewhere.
 const WORK_PER_CELL: usize = 4;

@@ -2,10 +2,10 @@
 
 use super::penalty::Bound;
 use super::problem::ArcCell;
-use crate::closed::ClosedChart;
-use crate::id::HalfEdgeId;
-use crate::mesh::Stars;
-use crate::union_find::UnionFind;
+use crate::map::closed::ClosedChart;
+use crate::topology::HalfEdgeId;
+use crate::topology::Stars;
+use crate::topology::union_find::UnionFind;
 
 /// Triangles around seeds, grouped into parts that share no vertex.
 pub(super) struct Patches {

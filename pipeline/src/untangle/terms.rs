@@ -1,6 +1,6 @@
 //! The constrained quantities, their gradients, and the part of their curvature that is kept.
 
-use crate::jacobian::{AT_CORNERS, PAIRS, cross};
+use crate::fem::jacobian::{AT_CORNERS, PAIRS, cross};
 use crate::mesh::TriangleShape;
 
 /// A Hermitian form in the six complex nodal values u + i v: real and imaginary parts.
@@ -136,8 +136,8 @@ pub(super) fn first_zero(c0: f64, c1: f64, c2: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jacobian::samples::{X, Y, moved};
-    use crate::jacobian::{Corners, Six};
+    use crate::fem::jacobian::samples::{X, Y, moved};
+    use crate::fem::jacobian::{Corners, Six};
 
     #[test]
     fn arcs_along_a_line_are_quadratic() {

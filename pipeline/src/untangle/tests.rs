@@ -1,9 +1,9 @@
 use super::*;
-use crate::boundary::{Boundary, Mids};
-use crate::host::Alone;
-use crate::linear::{linear_map, lower_ears};
+use crate::map::boundary::{Boundary, Mids};
+use crate::map::linear::{linear_map, lower_ears};
+use crate::map::quadratic::quadratic_map;
 use crate::mesh::TriangleSoup;
-use crate::quadratic::quadratic_map;
+use crate::monitor::Alone;
 use crate::{decompose, repair, shapes};
 
 /// A chart with its feasible start and its harmonic map.

@@ -198,6 +198,6 @@ impl Transform {
 
     fn determinant(&self) -> f64 {
         let [a, b, c, _] = self.0;
-        pipeline::space::dot(pipeline::space::cross(a, b), c)
+        planish_core::vec3::dot(planish_core::vec3::cross(a, b), c)
     }
 }

@@ -2,7 +2,7 @@ use super::super::{Beside, Format, Limits, Nothing, read_alone};
 use super::*;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
-use pipeline::mesh::TriangleSoup;
+use planish_core::mesh::TriangleSoup;
 use serde_json::{Value, json};
 use std::cell::RefCell;
 

@@ -1,6 +1,6 @@
 //! The binary form of MSH 4.1: little endian, `size_t` of eight bytes, `int` of four.
 
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// A file as it grows.
 pub struct Binary {

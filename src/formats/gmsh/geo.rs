@@ -1,7 +1,7 @@
 //! `remesh.geo`: a script that merges the atlas, sets sizes, and tells its reader what to change.
 
 use super::{ATLAS, ENLARGED};
-use pipeline::spikes::Spike;
+use planish_core::measure::spikes::Spike;
 
 /// From about this many triangles on, the script asks for the faster algorithm.
 const MANY: u32 = 20_000;

@@ -2,9 +2,9 @@
 //! other programs read it as a mesh. Gmsh replaces it when it remeshes.
 
 use super::Binary;
-use pipeline::atlas::Chart;
-use pipeline::seams::{Curve, SeamNetwork};
-use pipeline::subdivide::LinearAtlas;
+use planish_core::atlas::Chart;
+use planish_core::seams::{Curve, SeamNetwork};
+use planish_core::subdivide::LinearAtlas;
 
 /// Gmsh's numbers of element types: line, triangle, point.
 const LINE: i32 = 1;

@@ -11,11 +11,11 @@ pub use geo::{Algorithms, Narrow, Script, remesh};
 pub use read::{AtlasError, read as read_atlas};
 
 use binary::Binary;
-use pipeline::atlas::Chart;
-use pipeline::id::ChartId;
-use pipeline::seams::SeamNetwork;
-use pipeline::space::BoundingBox;
-use pipeline::subdivide::{LinearAtlas, LinearChart};
+use planish_core::atlas::Chart;
+use planish_core::seams::SeamNetwork;
+use planish_core::subdivide::{LinearAtlas, LinearChart};
+use planish_core::topology::ChartId;
+use planish_core::vec3::BoundingBox;
 
 /// The name of the atlas in a result folder, and in `remesh.geo`.
 pub const ATLAS: &str = "atlas.msh";

@@ -2,9 +2,9 @@
 //!
 //! Only what [`super::atlas`] writes is read: MSH 4.1, binary, little endian, its `$Entities` and `$Parametrizations`.
 
-use pipeline::evaluate::LinearMap;
-use pipeline::soundness::{HandedOverAtlas, HandedOverChart};
-use pipeline::space::Vec3;
+use planish_core::evaluate::LinearMap;
+use planish_core::soundness::{HandedOverAtlas, HandedOverChart};
+use planish_core::vec3::Vec3;
 
 /// Why a file is no atlas.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

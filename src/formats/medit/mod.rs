@@ -12,7 +12,7 @@ use super::place::{Place, shown};
 use super::words::{Uncommented, Words, float, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 use sections::{Kind, Section};
 
 /// Why bytes are no file of MEDIT.

@@ -3,7 +3,7 @@
 use super::MshError;
 use super::sparse::Sparse;
 use crate::formats::finish::BadPoints;
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// A table by tag may have so many places per node.
 const PLACES: u64 = 4;

@@ -8,7 +8,7 @@ use super::surface::Surface;
 use super::values::{Fault, Values, number};
 use crate::formats::finish::BadPoints;
 use crate::formats::{Limits, TooMany};
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// Checks that so many records can be there, of so many bytes each at least.
 fn fits<'a, V: Values<'a>>(values: &V, what: &'static str, count: u64, bytes: u64, most: u64) -> Result<(), MshError> {

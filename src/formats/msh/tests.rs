@@ -1,8 +1,8 @@
 use super::*;
 use crate::formats::mutate::mutations;
 use crate::formats::{Limits, Nothing};
-use pipeline::mesh::SoupError;
-use pipeline::space::Vec3;
+use planish_core::mesh::SoupError;
+use planish_core::vec3::Vec3;
 
 fn content(bytes: &[u8]) -> Result<Content, ReadError> {
     read(&Source { bytes, limits: &Limits::default(), beside: &Nothing })

@@ -13,7 +13,7 @@ use super::place::{Place, shown};
 use super::words::{float, foreign_number, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 use statements::{Kind, Plain, Statement, Statements, as_shown};
 
 /// Why bytes are no OBJ file.
@@ -217,7 +217,7 @@ mod tests {
     use super::*;
 
     use crate::formats::Nothing;
-    use pipeline::mesh::{SoupError, TriangleSoup};
+    use planish_core::mesh::{SoupError, TriangleSoup};
 
     fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
         limited(bytes, &Limits::default())
@@ -277,7 +277,7 @@ mod tests {
         let soup = read(format!("{SQUARE}mtllib a.mtl\ng one\nusemtl b\nf 1 2 3\ng two\nf 1 3 4\n").as_bytes());
         let soup = soup.expect("two groups");
         assert_eq!(soup.triangles().len(), 2);
-        let mesh = pipeline::repair(&soup, &Default::default()).expect("a surface").mesh;
+        let mesh = planish_core::repair(&soup, &Default::default()).expect("a surface").mesh;
         assert_eq!((mesh.census().vertices, mesh.census().components), (4, 1), "welded again");
     }
 

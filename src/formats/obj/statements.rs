@@ -1,7 +1,7 @@
 //! The statements of an OBJ file that tell of vertices and faces. Nothing is copied.
 
 use crate::formats::words::{comment, float};
-use pipeline::mesh::TriangleSoup;
+use planish_core::mesh::TriangleSoup;
 use std::io::{BufRead, Read, Result};
 
 /// What a statement tells.

@@ -11,7 +11,7 @@ use super::place::{Place, shown};
 use super::words::{Uncommented, Words, float, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// Why bytes are no OFF file.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]

@@ -1,7 +1,7 @@
 use super::*;
 use crate::formats::mutate::mutations;
 use crate::formats::{Format, Nothing, read_alone};
-use pipeline::mesh::SoupError;
+use planish_core::mesh::SoupError;
 
 fn content(text: &str) -> Result<Content, ReadError> {
     read_alone(Format::Off, text.as_bytes())

@@ -7,7 +7,7 @@ use super::values::{Bad, Values};
 use crate::formats::finish::BadPoints;
 use crate::formats::place::shown;
 use crate::formats::{Limits, Notes, TooMany, polygon};
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// Names of the list of corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];

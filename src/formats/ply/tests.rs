@@ -2,7 +2,7 @@ use super::header::{Property, Scalar};
 use super::*;
 use crate::formats::mutate::mutations;
 use crate::formats::{Limits, Nothing};
-use pipeline::mesh::SoupError;
+use planish_core::mesh::SoupError;
 
 fn content(bytes: &[u8]) -> Result<Content, ReadError> {
     read(&Source { bytes, limits: &Limits::default(), beside: &Nothing })

@@ -11,7 +11,7 @@
 
 mod tree;
 
-use pipeline::space::{Vec3, cross, dot, sub};
+use planish_core::vec3::{Vec3, cross, dot, sub};
 use tree::Tree;
 
 /// Looks per corner of a polygon, at most.

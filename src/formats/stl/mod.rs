@@ -12,7 +12,7 @@ use super::place::{Place, shown};
 use super::words::{float, foreign_number, no_number};
 use super::{Content, Notes, ReadError, Source, TooMany};
 use crate::outcome::Code;
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// Bytes before the triangles of a binary file, and per triangle.
 const HEADER: usize = 84;

@@ -1,7 +1,7 @@
 use super::*;
 
 use crate::formats::{Limits, Nothing};
-use pipeline::mesh::TriangleSoup;
+use planish_core::mesh::TriangleSoup;
 
 fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
     limited(bytes, &Limits::default())

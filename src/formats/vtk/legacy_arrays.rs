@@ -3,7 +3,7 @@
 use super::error::{Place, VtkError, shown};
 use super::scalar::{Order, Scalar};
 use super::text::Text;
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// Corners of cells one after the other, and where each ends.
 type CornersAndEnds = (Vec<u32>, Vec<u32>);

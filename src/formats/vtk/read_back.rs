@@ -7,7 +7,7 @@ use super::vtu::{Grid, Shape, VtuError};
 use super::xml::Arrays;
 use super::xml_outline::{Field, Piece, Role, Section, outline};
 use crate::formats::{Limits, Nothing, Source};
-use pipeline::distortion::CellFields;
+use planish_core::measure::distortion::CellFields;
 
 /// How every file of planish's begins; compressors came and went.
 const HEAD: &str =

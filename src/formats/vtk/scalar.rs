@@ -1,7 +1,7 @@
 //! Numbers as VTK stores them in bytes.
 
 pub(super) use crate::formats::scalar::Scalar;
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// In which order the bytes of a number stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

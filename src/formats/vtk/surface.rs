@@ -4,7 +4,7 @@ use super::cell::{self, Kind};
 use super::error::{Place, VtkError};
 use crate::formats::finish::{self, BadPoints};
 use crate::formats::{Content, Limits, Notes, ReadError, polygon};
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// The types of cells.
 #[derive(Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use super::error::{Place, VtkError, shown};
 use crate::formats::words::{float, remedy};
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 
 /// Text of a file, read from its front.
 #[derive(Clone, Debug)]

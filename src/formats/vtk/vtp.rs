@@ -1,8 +1,8 @@
 //! `seams.vtp`: the curves between charts as polylines, and corners as points, by `vtkio`.
 
 use super::vtu::COMPRESSOR;
-use pipeline::mesh::SurfaceMesh;
-use pipeline::seams::{Curve, SeamNetwork};
+use planish_core::mesh::SurfaceMesh;
+use planish_core::seams::{Curve, SeamNetwork};
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version, VertexNumbers, Vtk,
 };

@@ -2,11 +2,11 @@
 
 use super::error::VtkError;
 pub use super::read_back::{read, read_shape};
-use pipeline::atlas::Chart;
-use pipeline::certify::CertifiedMap;
-use pipeline::distortion::CellFields;
-use pipeline::mesh::SurfaceMesh;
-use pipeline::space::midpoint;
+use planish_core::atlas::Chart;
+use planish_core::certify::CertifiedMap;
+use planish_core::measure::distortion::CellFields;
+use planish_core::mesh::SurfaceMesh;
+use planish_core::vec3::midpoint;
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, IOBuffer, UnstructuredGridPiece, Version,
     VertexNumbers, Vtk,
@@ -105,12 +105,12 @@ pub fn param(views: &[ChartView]) -> Result<Vec<u8>, VtuError> {
 
 /// The position of a node in space: that of a vertex, or the middle of a straight edge.
 fn position(view: &ChartView, node: usize) -> [f64; 3] {
-    let place = |v: pipeline::id::VertexId| view.mesh.points()[view.chart.vertices()[v.index()].index()];
+    let place = |v: planish_core::topology::VertexId| view.mesh.points()[view.chart.vertices()[v.index()].index()];
     let vertices = view.chart.vertices().len();
     if node < vertices {
         return view.mesh.points()[view.chart.vertices()[node].index()];
     }
-    let h = view.chart.edges().sides(pipeline::id::EdgeId::at(node - vertices))[0];
+    let h = view.chart.edges().sides(planish_core::topology::EdgeId::at(node - vertices))[0];
     midpoint(place(view.chart.from(h)), place(view.chart.from(h.next())))
 }
 
@@ -162,7 +162,7 @@ fn point_fields(views: &[ChartView]) -> Vec<Attribute> {
     let uv: Vec<f64> = views.iter().flat_map(nodes).flat_map(|p| p.uv()).collect();
     let mut vertex: Vec<i32> = Vec::new();
     for view in views {
-        let welded = |v: &pipeline::id::VertexId| view.mesh.input_vertex(*v).map_or(-2, |w| w as i32);
+        let welded = |v: &planish_core::topology::VertexId| view.mesh.input_vertex(*v).map_or(-2, |w| w as i32);
         vertex.extend(view.chart.vertices().iter().map(welded));
         vertex.resize(vertex.len() + view.map.map().nodes.len() - view.chart.vertices().len(), -1);
     }

@@ -7,7 +7,7 @@ use super::surface::{Cells, Surface, Types};
 use super::text::Text;
 use super::xml_outline::{Appended, Array, Data, Outline, Piece, Role, Section, outline};
 use crate::formats::{Content, ReadError, Source};
-use pipeline::space::Vec3;
+use planish_core::vec3::Vec3;
 use std::borrow::Cow;
 
 /// Reads an XML file.

@@ -18,9 +18,9 @@ mod text;
 mod vtk;
 mod xml;
 
-use pipeline::host::Alone;
-use pipeline::mesh::TriangleSoup;
 use planish::formats::{self, Kind};
+use planish_core::mesh::TriangleSoup;
+use planish_core::monitor::Alone;
 use rustix::time::{ClockId, clock_gettime};
 use std::error::Error;
 use std::path::Path;
@@ -139,7 +139,7 @@ fn read_elsewhere(path: &Path, cut: bool) -> Result<Measured, Box<dyn Error>> {
 fn measure(path: &Path, cut: bool) -> Result<(), Box<dyn Error>> {
     let Kind::Mesh(format) = formats::kind(path) else { return Err("no mesh".into()) };
     let decode = |bytes: &[u8]| formats::read_alone(format, bytes).map(|content| content.soup);
-    let repair = |soup: &TriangleSoup| pipeline::repair(soup, &Default::default()).map(|repaired| repaired.mesh);
+    let repair = |soup: &TriangleSoup| planish_core::repair(soup, &Default::default()).map(|repaired| repaired.mesh);
     // As it is in a job: the file is gone when repair begins, and the soup when the surface is cut.
     let before = peak()?;
     let bytes = std::fs::read(path)?;
@@ -152,7 +152,7 @@ fn measure(path: &Path, cut: bool) -> Result<(), Box<dyn Error>> {
     drop(soup);
     let mut whole = 0.0;
     if cut {
-        pipeline::decompose(&mesh, &Default::default(), &Alone)?;
+        planish_core::decompose(&mesh, &Default::default(), &Alone)?;
         whole = peak()? - before;
     }
     drop(mesh);

@@ -7,9 +7,9 @@
 //! unknowns, and leaves a smaller factor than minimum degree on all of them (by a quarter on surfaces of 100 000
 //! triangles), which cannot see what vertices and edges have to do with each other.
 
-use crate::closed::ClosedChart;
-use crate::id::{HalfEdgeId, VertexId};
-use crate::sparse::{PRESCRIBED, Pattern};
+use crate::fem::sparse::{PRESCRIBED, Pattern};
+use crate::map::closed::ClosedChart;
+use crate::topology::{HalfEdgeId, VertexId};
 
 /// The order in which the vertices inside are eliminated: all of the `count` ones in `triangles` that are not on
 /// `outer`.

@@ -6,9 +6,10 @@
 //! part of the result.
 
 use crate::atlas::Chart;
-use crate::elimination;
-use crate::id::{HalfEdgeId, VertexId};
-use crate::mesh::{EdgeTable, TriangleShape};
+use crate::fem::elimination;
+use crate::mesh::TriangleShape;
+use crate::topology::EdgeTable;
+use crate::topology::{HalfEdgeId, VertexId};
 use std::f64::consts::TAU;
 
 /// A chart without holes: its own triangles first, then the fans.

@@ -3,11 +3,11 @@
 //! Distortion is measured against the triangles in space, with their mollified shapes. All numbers are finite.
 
 use crate::atlas::Chart;
-use crate::bernstein::{self, ExactDet};
 use crate::certify::CertifiedMap;
-use crate::element;
+use crate::fem::bernstein::{self, ExactDet};
+use crate::fem::element;
 use crate::grid::GridPoint;
-use crate::mesh::Stars;
+use crate::topology::Stars;
 
 /// The fields of one triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,8 +5,8 @@
 //! several times the work). Unknowns are eliminated in an order of minimum degree (AMD: Amestoy, Davis and Duff 1996,
 //! doi 10.1137/S0895479894278952), or as they are numbered. General systems are solved by LU.
 
-use crate::buckets::Buckets;
-use crate::host::{Cancelled, Host, Reserved};
+use crate::monitor::{Cancelled, Host, Reserved};
+use crate::topology::csr::Buckets;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::prelude::Solve;
@@ -245,7 +245,7 @@ pub fn solve_general(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::host::Alone;
+    use crate::monitor::Alone;
 
     /// A chain of springs between unknowns 0..n, the first one fastened.
     fn chain(n: u32) -> (Vec<[u32; 2]>, [[f64; 2]; 2]) {

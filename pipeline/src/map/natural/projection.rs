@@ -5,10 +5,10 @@
 
 use super::{Natural, certified};
 use crate::atlas::Chart;
-use crate::distortion::quantiles;
 use crate::evaluate::Plane;
+use crate::measure::distortion::quantiles;
 use crate::mesh::SurfaceMesh;
-use crate::space::{Vec3, cross, dot, norm, sub};
+use crate::vec3::{Vec3, cross, dot, norm, sub};
 
 /// The projection of `chart`, one of `mesh`, along the mean of its normals; none where that is not one-to-one, or the
 /// conformal distortion of a hundredth of the area is above `most`.

@@ -1,7 +1,7 @@
 //! Edge weights of linear maps: each vertex inside becomes the weighted mean of its neighbours.
 
-use crate::closed::ClosedChart;
-use crate::id::HalfEdgeId;
+use crate::map::closed::ClosedChart;
+use crate::topology::HalfEdgeId;
 
 /// How far a negative weight is raised, relative to the mean value weight of the edge. (Raising to zero is not
 /// enough: it can leave triangles of area zero.)
@@ -41,7 +41,7 @@ pub(crate) fn mean_value(chart: &ClosedChart) -> Vec<[f64; 2]> {
 /// both kinds of weights have the same sum around a vertex, and averaged over both ends (which keeps the matrix
 /// symmetric; the convex combination theorem asks for positive weights only).
 pub(crate) fn replacements(chart: &ClosedChart, harmonic: &[f64], mean_value: &[[f64; 2]]) -> Vec<f64> {
-    let ends = |e: usize| chart.ends(chart.edges().sides(crate::id::EdgeId::at(e))[0]);
+    let ends = |e: usize| chart.ends(chart.edges().sides(crate::topology::EdgeId::at(e))[0]);
     let mut sums = vec![[0.0_f64; 2]; chart.vertex_count()];
     for e in 0..harmonic.len() {
         for (v, mv) in ends(e).into_iter().zip(mean_value[e]) {
@@ -49,7 +49,7 @@ pub(crate) fn replacements(chart: &ClosedChart, harmonic: &[f64], mean_value: &[
             sums[v.index()][1] += mv;
         }
     }
-    let scale = |v: crate::id::VertexId| sums[v.index()][0] / sums[v.index()][1];
+    let scale = |v: crate::topology::VertexId| sums[v.index()][0] / sums[v.index()][1];
     (0..harmonic.len())
         .map(|e| {
             let [a, b] = ends(e);

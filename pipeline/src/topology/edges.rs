@@ -1,8 +1,8 @@
 //! Which triangles meet along which edge. The table never sees positions, and takes any triangulation:
 //! non-manifold and inconsistently oriented ones too.
 
-use crate::buckets::Buckets;
-use crate::id::{EdgeId, FaceId, HalfEdgeId, VertexId};
+use crate::topology::csr::Buckets;
+use crate::topology::{EdgeId, FaceId, HalfEdgeId, VertexId};
 
 /// The edges of a triangulation, each with the half-edges that run along it in either direction.
 ///

@@ -1,7 +1,7 @@
 //! The jacobian determinant of a 6-node triangle in doubles: its Bernstein coefficients and their derivatives. What is
-//! decided is decided by [`crate::bernstein`], exactly; this serves optimisation and figures.
+//! decided is decided by [`crate::fem::bernstein`], exactly; this serves optimisation and figures.
 
-use crate::element;
+use crate::fem::element;
 use std::sync::LazyLock;
 
 /// Values at six nodes.
@@ -87,7 +87,7 @@ mod tests {
     fn coefficients_are_those_of_the_exact_ones() {
         use crate::grid::GridPoint;
         let vertex = |n: usize| if n < 3 { GridPoint::vertex(X[n]) } else { GridPoint::mid(X[n]) };
-        let exact = crate::bernstein::ExactDet::new(std::array::from_fn(vertex)).coefficients();
+        let exact = crate::fem::bernstein::ExactDet::new(std::array::from_fn(vertex)).coefficients();
         for (a, b) in Corners::new(&X).dets().into_iter().zip(exact) {
             assert!((a - b).abs() < 1e-14, "{a} {b}");
         }

@@ -6,7 +6,7 @@
 //!
 //! Memory is reserved before a sparse system is factorised, which takes more of it than all else together. **A
 //! computation holds at most one reservation at a time, and is at no safe point while it holds one**: each is made and
-//! given back within one solution of a system ([`crate::sparse`]). So whoever waits for memory waits for computations
+//! given back within one solution of a system ([`crate::fem::sparse`]). So whoever waits for memory waits for computations
 //! that wait for nothing, and budgets cannot deadlock.
 
 use std::cell::Cell;
@@ -104,13 +104,13 @@ impl<'a> Pace<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::boundary::{Boundary, Mids};
     use crate::certify::PlanarMap;
-    use crate::closed::ClosedChart;
-    use crate::id::FaceId;
-    use crate::linear::mean_value_map;
+    use crate::fem::sparse::{self, Pattern, solve_general};
+    use crate::map::boundary::{Boundary, Mids};
+    use crate::map::closed::ClosedChart;
+    use crate::map::linear::mean_value_map;
     use crate::mesh::{SurfaceMesh, TriangleSoup};
-    use crate::sparse::{self, Pattern, solve_general};
+    use crate::topology::FaceId;
     use crate::{Order, SplitError, decompose, finish_or_split, map_or_split, repair, shapes};
     use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};

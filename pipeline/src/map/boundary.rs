@@ -4,8 +4,8 @@
 //! vertices coincide), or on points that the caller prescribes. Mid-edge nodes lie on the arc, or on the chord.
 //! The boundary is chosen once: the harmonic map, the feasible start and the result share it.
 
-use crate::closed::ClosedChart;
 use crate::grid::GridPoint;
+use crate::map::closed::ClosedChart;
 use std::f64::consts::TAU;
 
 /// The shortest edge, relative to the mean, as far as its arc is concerned.

@@ -10,13 +10,13 @@
 //!
 //! Guarantees: in a [`LinearMap`] every triangle, those of virtual fans included, turns left, exactly.
 
-use crate::boundary::Boundary;
-use crate::closed::ClosedChart;
+use crate::fem::sparse::{self, Analysis, PRESCRIBED, Pattern};
 use crate::grid::{GridPoint, orientation};
-use crate::host::Host;
-use crate::id::{EdgeId, FaceId, HalfEdgeId};
-use crate::sparse::{self, Analysis, PRESCRIBED, Pattern};
-use crate::weights;
+use crate::map::boundary::Boundary;
+use crate::map::closed::ClosedChart;
+use crate::map::weights;
+use crate::monitor::Host;
+use crate::topology::{EdgeId, FaceId, HalfEdgeId};
 
 /// After this many rounds of local changes, all negative edges are changed at once.
 const LOCAL_ROUNDS: u32 = 6;
@@ -174,7 +174,7 @@ pub fn harmonic_places(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host
 
 /// The triangles that do not turn left, exactly.
 pub fn folded(chart: &ClosedChart, places: &[GridPoint]) -> Vec<FaceId> {
-    let place = |t: &[crate::id::VertexId; 3]| t.map(|v| places[v.index()]);
+    let place = |t: &[crate::topology::VertexId; 3]| t.map(|v| places[v.index()]);
     let turns_left = |p: [GridPoint; 3]| orientation(p[0], p[1], p[2]) > 0;
     let all = chart.triangles().iter().enumerate();
     all.filter(|(_, t)| !turns_left(place(t))).map(|(f, _)| FaceId::at(f)).collect()
@@ -313,7 +313,7 @@ pub fn lower_ears(chart: &ClosedChart, linear: &LinearMap, boundary: &mut Bounda
         let [p, q, r] = chart.triangles()[face].map(|v| linear.places[v.index()]);
         let straight = 2.0 * orientation(p, q, r) as f64;
         for all_the_way in [false, true] {
-            let det = crate::bernstein::ExactDet::new(chart.nodes(face).map(|n| nodes[n]));
+            let det = crate::fem::bernstein::ExactDet::new(chart.nodes(face).map(|n| nodes[n]));
             let least = det.corner.iter().chain(&det.edge).fold(f64::INFINITY, |m, c| m.min(*c as f64));
             if least > MARGIN * straight {
                 break;
@@ -329,10 +329,11 @@ pub fn lower_ears(chart: &ClosedChart, linear: &LinearMap, boundary: &mut Bounda
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::boundary::Mids;
-    use crate::host::Alone;
+    use crate::fem::bernstein;
+    use crate::map::boundary::Mids;
     use crate::mesh::TriangleSoup;
-    use crate::{bernstein, decompose, repair, shapes};
+    use crate::monitor::Alone;
+    use crate::{decompose, repair, shapes};
 
     fn closed(soup: &TriangleSoup) -> ClosedChart {
         let mesh = repair(soup, &Default::default()).expect("a surface").mesh;

@@ -16,10 +16,10 @@ mod projection;
 
 use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
-use crate::distortion::{Summary, quantiles, singular_ratio};
 use crate::grid::GridPoint;
-use crate::host::Host;
+use crate::measure::distortion::{Summary, quantiles, singular_ratio};
 use crate::mesh::SurfaceMesh;
+use crate::monitor::Host;
 pub use conformal::conformal;
 pub use projection::projection;
 
@@ -120,9 +120,9 @@ fn stretch(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::host::Alone;
     use crate::mesh::TriangleSoup;
-    use crate::space::Vec3;
+    use crate::monitor::Alone;
+    use crate::vec3::Vec3;
     use crate::{decompose, repair, shapes};
 
     fn charts(soup: &TriangleSoup) -> (SurfaceMesh, Vec<Chart>) {

@@ -7,7 +7,7 @@
 //! non-manifold edges measure nothing. All numbers are finite.
 
 use crate::mesh::SurfaceMesh;
-use crate::space::{Vec3, cross, dot, norm, sub};
+use crate::vec3::{Vec3, cross, dot, norm, sub};
 
 /// Curvatures are cut off here, per diagonal of the bounding box: no mesher resolves radii below.
 const LARGEST: f64 = 1e9;

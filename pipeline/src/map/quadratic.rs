@@ -5,16 +5,16 @@
 //! metric is constant. The map minimises the Dirichlet energy among all quadratic maps with these boundary
 //! values; it need not be valid, and typically a few triangles in a thousand are not.
 
-use crate::bernstein::{self, ExactDet, Validity};
-use crate::boundary::Boundary;
-use crate::closed::ClosedChart;
-use crate::element;
-use crate::elimination;
+use crate::fem::bernstein::{self, ExactDet, Validity};
+use crate::fem::element;
+use crate::fem::elimination;
+use crate::fem::jacobian::Corners;
+use crate::fem::sparse::{self, PRESCRIBED, Pattern};
 use crate::grid::GridPoint;
-use crate::host::{Host, Pace};
-use crate::id::FaceId;
-use crate::jacobian::Corners;
-use crate::sparse::{self, PRESCRIBED, Pattern};
+use crate::map::boundary::Boundary;
+use crate::map::closed::ClosedChart;
+use crate::monitor::{Host, Pace};
+use crate::topology::FaceId;
 
 /// The harmonic map by quadratic elements, valid or not.
 #[derive(Clone, Debug)]
@@ -166,9 +166,10 @@ pub(crate) fn energies(chart: &ClosedChart, places: &[[f64; 2]]) -> impl Iterato
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::boundary::Mids;
-    use crate::host::Alone;
-    use crate::{decompose, linear, repair, shapes};
+    use crate::map::boundary::Mids;
+    use crate::map::linear;
+    use crate::monitor::Alone;
+    use crate::{decompose, repair, shapes};
 
     #[test]
     fn the_map_has_no_more_energy_than_the_raised_linear_one() {

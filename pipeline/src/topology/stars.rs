@@ -1,6 +1,6 @@
 //! The star of a vertex: the triangles around it.
 
-use crate::id::VertexId;
+use crate::topology::VertexId;
 
 /// Per vertex, the triangles around it, ascending.
 #[derive(Clone, Debug)]

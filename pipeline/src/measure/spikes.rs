@@ -14,11 +14,11 @@
 //! the surface is flat), however many triangles an edge is long.
 
 use crate::atlas::Chart;
-use crate::curvature::Principal;
 use crate::evaluate::on_segment;
-use crate::id::{FaceId, HalfEdgeId};
+use crate::measure::curvature::Principal;
 use crate::mesh::SurfaceMesh;
-use crate::space::{Vec3, cross, distance, dot, norm, sub, triangle_area};
+use crate::topology::{FaceId, HalfEdgeId};
+use crate::vec3::{Vec3, cross, distance, dot, norm, sub, triangle_area};
 use std::f64::consts::{PI, TAU};
 
 /// Below this share of a disk a place is thin: a cone of half-angle 37 degrees. The nostrils of face_bff, which

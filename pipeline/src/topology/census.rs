@@ -1,8 +1,8 @@
 //! Counting: what kind of surface is this?
 
 use super::EdgeTable;
-use crate::id::{FaceId, HalfEdgeId, VertexId};
-use crate::union_find::UnionFind;
+use crate::topology::union_find::UnionFind;
+use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
 /// The numbers that tell what a triangulated surface is.
 #[derive(Clone, Debug, PartialEq, Eq)]

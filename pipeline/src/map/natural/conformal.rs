@@ -7,9 +7,9 @@
 use super::{Natural, certified};
 use crate::atlas::Chart;
 use crate::certify::parts;
-use crate::host::Host;
+use crate::fem::sparse::{self, PRESCRIBED, Pattern};
 use crate::mesh::TriangleShape;
-use crate::sparse::{self, PRESCRIBED, Pattern};
+use crate::monitor::Host;
 
 /// The least squares conformal map of `chart`; none where it is not one-to-one.
 ///

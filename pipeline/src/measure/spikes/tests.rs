@@ -1,7 +1,8 @@
 use super::*;
-use crate::host::Alone;
+use crate::measure::curvature;
 use crate::mesh::TriangleSoup;
-use crate::{curvature, decompose, repair};
+use crate::monitor::Alone;
+use crate::{decompose, repair};
 use std::f64::consts::{PI, TAU};
 
 /// A disk of radius 4 whose middle, up to radius 1, is drawn out to a cone of half-angle `degrees`, in edges of about

@@ -1,0 +1,5 @@
+//! Measures: how maps distort, and how surfaces bend.
+
+pub mod curvature;
+pub mod distortion;
+pub mod spikes;
