@@ -45,7 +45,7 @@ use parking_lot::RwLock;
 use planish_core::MappedChart;
 use planish_core::atlas::Chart;
 use planish_core::mesh::TriangleSoup;
-use planish_core::monitor::Host;
+use planish_core::monitor::Monitor;
 use queue::Queue;
 use reading::Next;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -284,7 +284,7 @@ fn hand_on<T>(to: &Sender<T>, item: T) {
 }
 
 fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
-    match travel.compute(Stage::Decompose, |host| stages::cut(soup, &travel.settings, &mut report, host)) {
+    match travel.compute(Stage::Decompose, |monitor| stages::cut(soup, &travel.settings, &mut report, monitor)) {
         Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
         Ok((mesh, parts)) => {
             let surface = Surface::new(travel, mesh, parts.len(), report);
@@ -297,7 +297,7 @@ fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: 
 
 fn map(Cut { surface, place, chart }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
     let travel = &surface.travel;
-    let work = |host: &dyn Host| stages::map(&surface.mesh, chart, &travel.settings, host);
+    let work = |monitor: &dyn Monitor| stages::map(&surface.mesh, chart, &travel.settings, monitor);
     let parts = if surface.is_due(place) { travel.compute(Stage::Map, work) } else { Err(Stopped::Unwanted) };
     match parts {
         Err(why) => deposit(surface, place, Err(why), finished),
@@ -312,7 +312,7 @@ fn map(Cut { surface, place, chart }: Cut, untangle: &Sender<Mapped>, finished: 
 
 fn untangle(Mapped { surface, place, mapped }: Mapped, finished: &Sender<Finished>) {
     let travel = &surface.travel;
-    let work = |host: &dyn Host| stages::untangle(&surface.mesh, mapped, &travel.settings, host);
+    let work = |monitor: &dyn Monitor| stages::untangle(&surface.mesh, mapped, &travel.settings, monitor);
     let part = if surface.is_due(place) { travel.compute(Stage::Untangle, work) } else { Err(Stopped::Unwanted) };
     deposit(surface, place, part, finished);
 }

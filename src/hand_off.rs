@@ -9,7 +9,7 @@ use planish_core::map::natural::{Natural, natural};
 use planish_core::measure::distortion::Summary;
 use planish_core::measure::spikes::spikes;
 use planish_core::mesh::SurfaceMesh;
-use planish_core::monitor::Alone;
+use planish_core::monitor::NoMonitor;
 use planish_core::seams::{Curve, Passage, SeamNetwork};
 use planish_core::subdivide::{self, LinearAtlas, subdivide};
 use planish_core::topology::{ChartId, FaceId};
@@ -122,7 +122,7 @@ pub fn gmsh(
 fn natural_maps(mesh: &SurfaceMesh, charts: &[Chart], distortions: &[Summary]) -> Vec<Option<Natural>> {
     let of_chart = |(chart, on_disk): (&Chart, &Summary)| {
         let p99 = on_disk.conformal_p99;
-        (p99 > BENT).then(|| natural(mesh, chart, p99, &Alone)).flatten()
+        (p99 > BENT).then(|| natural(mesh, chart, p99, &NoMonitor)).flatten()
     };
     charts.iter().zip(distortions).map(of_chart).collect()
 }

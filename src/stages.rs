@@ -16,7 +16,7 @@ use planish_core::fem::sparse;
 use planish_core::map::linear;
 use planish_core::measure::distortion::{self, CellFields};
 use planish_core::mesh::{SurfaceMesh, TriangleSoup};
-use planish_core::monitor::{Alone, Host};
+use planish_core::monitor::{Monitor, NoMonitor};
 use planish_core::repair::Repaired;
 use planish_core::seams::SeamNetwork;
 use planish_core::{CertifiedChart, MapError, MappedChart, SplitError, finish_or_split, map_or_split, repair};
@@ -250,7 +250,7 @@ pub fn cut(
     soup: TriangleSoup,
     settings: &Settings,
     report: &mut Report,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<(SurfaceMesh, Vec<Chart>), Stopped> {
     let found = repaired(&soup, settings)?;
     // The surface is all that is needed from here on.
@@ -260,7 +260,7 @@ pub fn cut(
     report.warnings = report::warnings(&found);
     report.warnings.iter().for_each(|w| tracing::warn!("{}", w.message));
     check_sheets(&found)?;
-    let atlas = planish_core::decompose(&found.mesh, &settings.decompose(), host).map_err(not_cut)?;
+    let atlas = planish_core::decompose(&found.mesh, &settings.decompose(), monitor).map_err(not_cut)?;
     let feature_edges = atlas.feature_edges();
     report.decomposition = Some(Decomposition { feature_edges, ..Decomposition::default() });
     let without = split_ears(&found.mesh, &atlas, settings.decompose().max_triangles);
@@ -275,7 +275,7 @@ pub fn cut(
 
 fn not_cut(error: decompose::Error) -> Stopped {
     match error {
-        decompose::Error::Cancelled => Stopped::Unwanted,
+        decompose::Error::Interrupted(_) => Stopped::Unwanted,
         fault @ decompose::Error::Illegal(_) => internal(fault).into(),
     }
 }
@@ -292,9 +292,9 @@ pub fn map(
     mesh: &SurfaceMesh,
     chart: Chart,
     settings: &Settings,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<(Chart, MappedChart)>, Stopped> {
-    map_or_split(mesh, chart, settings.order, &settings.decompose(), host).map_err(not_mapped)
+    map_or_split(mesh, chart, settings.order, &settings.decompose(), monitor).map_err(not_mapped)
 }
 
 /// Untangles and certifies a chart, splitting it where it must be.
@@ -305,14 +305,14 @@ pub fn untangle(
     mesh: &SurfaceMesh,
     (chart, mapped): (Chart, MappedChart),
     settings: &Settings,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<(Chart, CertifiedChart)>, Stopped> {
-    finish_or_split(mesh, chart, mapped, settings.order, &settings.decompose(), host).map_err(not_mapped)
+    finish_or_split(mesh, chart, mapped, settings.order, &settings.decompose(), monitor).map_err(not_mapped)
 }
 
 fn not_mapped(error: SplitError) -> Stopped {
     let code = match &error {
-        SplitError::Cancelled | SplitError::Split(decompose::Error::Cancelled) => return Stopped::Unwanted,
+        SplitError::Interrupted(_) => return Stopped::Unwanted,
         SplitError::Map(MapError::Linear(linear::Error::Solver(sparse::Error::TooLarge { .. }))) => Code::TooLarge,
         SplitError::Map(_) => Code::NeedsSplit,
         SplitError::Split(_) => Code::Internal,
@@ -369,8 +369,8 @@ pub fn finish(found: &Repaired, atlas: Atlas, settings: &Settings, report: &mut 
     let whole = atlas.charts().len();
     let mut done = Vec::new();
     for chart in atlas.into_charts() {
-        for mapped in map(&found.mesh, chart, settings, &Alone)? {
-            done.extend(untangle(&found.mesh, mapped, settings, &Alone)?);
+        for mapped in map(&found.mesh, chart, settings, &NoMonitor)? {
+            done.extend(untangle(&found.mesh, mapped, settings, &NoMonitor)?);
         }
     }
     Ok(assemble(&found.mesh, done, whole, settings, report)?)

@@ -5,7 +5,7 @@ use planish::formats::{self, Kind};
 use planish_core::atlas::Chart;
 use planish_core::measure::distortion;
 use planish_core::mesh::TriangleSoup;
-use planish_core::monitor::Alone;
+use planish_core::monitor::NoMonitor;
 use planish_core::{CertifiedChart, Order, decompose, finish_or_split, map_or_split, repair};
 
 /// The largest area ratio: enough for the bent disk to stay whole, so that its energies can be compared.
@@ -15,10 +15,10 @@ const MAX_AREA_RATIO: f64 = 1e7;
 fn charts(soup: &TriangleSoup) -> Vec<CertifiedChart> {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
     let settings = decompose::Settings { max_area_ratio: MAX_AREA_RATIO, feature_angle: None, ..Default::default() };
-    let atlas = decompose(&mesh, &settings, &Alone).expect("an atlas");
-    let parts = |chart| map_or_split(&mesh, chart, Order::Quadratic, &settings, &Alone).expect("maps");
+    let atlas = decompose(&mesh, &settings, &NoMonitor).expect("an atlas");
+    let parts = |chart| map_or_split(&mesh, chart, Order::Quadratic, &settings, &NoMonitor).expect("maps");
     let finished = |(chart, mapped)| {
-        finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings, &Alone)
+        finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings, &NoMonitor)
             .expect("maps")
             .into_iter()
             .map(within_bound)

@@ -13,7 +13,7 @@ use crate::map::linear::{self, LinearMap, linear_map, lower_ears};
 use crate::map::quadratic::{QuadraticMap, least_det, quadratic_map};
 use crate::measure::distortion;
 use crate::mesh::SurfaceMesh;
-use crate::monitor::{Alone, Cancelled, Host, Pace};
+use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
 use crate::untangle::{self, Untangled, untangle};
 use cut::{Attempt, Cutter};
 
@@ -69,20 +69,14 @@ pub enum MapError {
         log_scales: Vec<f64>,
     },
     /// The map was not wanted any more.
-    #[error("the map was cancelled")]
-    Cancelled,
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
 }
 
 impl MapError {
     /// Per triangle, the logarithm of the area scale around it, where the chart has a map.
     fn log_scales(&self) -> Option<&[f64]> {
         if let Self::Stretched { log_scales, .. } = self { Some(log_scales) } else { None }
-    }
-}
-
-impl From<Cancelled> for MapError {
-    fn from(Cancelled: Cancelled) -> Self {
-        Self::Cancelled
     }
 }
 
@@ -118,41 +112,46 @@ pub struct Harmonic {
 /// # Errors
 /// [`MapError`]: the chart must be split.
 pub fn map_chart(chart: &Chart, order: Order) -> Result<MappedChart, MapError> {
-    map_within(chart, order, f64::INFINITY, &Alone)
+    map_within(chart, order, f64::INFINITY, &NoMonitor)
 }
 
 /// As [`map_chart`], where a chart whose certified map would exceed `max_area_ratio` need not be mapped.
 ///
 /// # Errors
 /// [`MapError`]: the chart must be split, or nobody waits for the map any more.
-pub fn map_within(chart: &Chart, order: Order, max_area_ratio: f64, host: &dyn Host) -> Result<MappedChart, MapError> {
-    let pace = Pace::new(host);
-    let visited_all = || pace.after(chart.triangles().len());
+pub fn map_within(
+    chart: &Chart,
+    order: Order,
+    max_area_ratio: f64,
+    monitor: &dyn Monitor,
+) -> Result<MappedChart, MapError> {
+    let checkpoint = Checkpoint::new(monitor);
+    let size = chart.triangles().len();
     let closed = ClosedChart::new(chart);
-    visited_all()?;
+    checkpoint.after(size)?;
     let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
     let mut boundary = Boundary::circle(&closed, mids);
-    let linear = linear_map(&closed, &boundary, host);
-    // Before its error is believed: it may have been cancelled.
-    pace.end()?;
+    let linear = linear_map(&closed, &boundary, monitor);
+    // Before its error is believed: it may have been interrupted.
+    checkpoint.end()?;
     let linear = linear?;
     lower_ears(&closed, &linear, &mut boundary);
     let start = linear.raised(&closed, &boundary);
     let centres = (0..closed.loops().len()).map(|k| start[closed.centre_node(k)]).collect();
     let certified_start = prove(planar(&closed, &start, centres)).map_err(MapError::Start)?;
-    visited_all()?;
+    checkpoint.after(size)?;
     let ratio = distortion::area_ratio(chart, &certified_start);
     let within = |ratio: f64, bound: f64| {
         let stretched = || MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) };
         if ratio > bound { Err(stretched()) } else { Ok(()) }
     };
     within(ratio, if order == Order::Linear { max_area_ratio } else { HOPELESS * max_area_ratio })?;
-    let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary, host));
+    let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary, monitor));
     if let Some(Ok(map)) = &harmonic {
         let of_harmonic = distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n]));
         within(ratio.sqrt() * of_harmonic.sqrt(), max_area_ratio)?;
     }
-    pace.end()?;
+    checkpoint.end()?;
     Ok(MappedChart { closed, linear, start, certified_start, harmonic })
 }
 
@@ -172,9 +171,9 @@ pub fn map_or_split(
     chart: Chart,
     order: Order,
     settings: &decompose::Settings,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<(Chart, MappedChart)>, SplitError> {
-    let cutter = Cutter { mesh, order, settings, host };
+    let cutter = Cutter { mesh, order, settings, monitor };
     let mut mapped = Vec::new();
     let mut waiting = vec![chart];
     while let Some(chart) = waiting.pop() {
@@ -186,7 +185,7 @@ pub fn map_or_split(
             Attempt::Split(parts) => waiting.extend(parts.into_iter().rev()),
             // Its map is what it is.
             Attempt::Single => {
-                let map = map_within(&chart, order, f64::INFINITY, host)?;
+                let map = map_within(&chart, order, f64::INFINITY, monitor)?;
                 mapped.push((chart, map));
             }
         }
@@ -204,36 +203,36 @@ pub enum SplitError {
     #[error(transparent)]
     Split(decompose::Error),
     /// The map was not wanted any more.
-    #[error("the map was cancelled")]
-    Cancelled,
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
 }
 
 impl From<MapError> for SplitError {
     fn from(error: MapError) -> Self {
-        if error == MapError::Cancelled { Self::Cancelled } else { Self::Map(error) }
+        match error {
+            MapError::Interrupted(interrupted) => interrupted.into(),
+            error => Self::Map(error),
+        }
     }
 }
 
 impl From<decompose::Error> for SplitError {
     fn from(error: decompose::Error) -> Self {
-        if error == decompose::Error::Cancelled { Self::Cancelled } else { Self::Split(error) }
-    }
-}
-
-impl From<Cancelled> for SplitError {
-    fn from(Cancelled: Cancelled) -> Self {
-        Self::Cancelled
+        match error {
+            decompose::Error::Interrupted(interrupted) => interrupted.into(),
+            error => Self::Split(error),
+        }
     }
 }
 
 /// Untangles the harmonic map of a chart and certifies the result; where that cannot be proven, the result is the
 /// feasible start.
 pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
-    finish(mapped, &Alone)
+    finish(mapped, &NoMonitor)
 }
 
 /// As [`finish_chart`]. Where nobody waits for the result any more, it is unfinished.
-fn finish(mapped: MappedChart, host: &dyn Host) -> CertifiedChart {
+fn finish(mapped: MappedChart, monitor: &dyn Monitor) -> CertifiedChart {
     let MappedChart { closed, linear, start, certified_start, harmonic } = mapped;
     let of_start = |start: CertifiedMap, linear, unsolved| CertifiedChart {
         certified: start.clone(),
@@ -251,7 +250,7 @@ fn finish(mapped: MappedChart, host: &dyn Host) -> CertifiedChart {
     let mut invalid = vec![false; closed.own_triangles()];
     map.invalid().iter().for_each(|f| invalid[f.index()] = true);
     let found = Harmonic { invalid, det_min: least_det(&closed, &map) };
-    let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &start, &map, host);
+    let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &start, &map, monitor);
     let certified = match prove(planar(&closed, &nodes, hole_centres)) {
         Ok(certified) => certified,
         Err(_) => {
@@ -275,19 +274,19 @@ pub fn finish_or_split(
     mapped: MappedChart,
     order: Order,
     settings: &decompose::Settings,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<(Chart, CertifiedChart)>, SplitError> {
-    let pace = Pace::new(host);
+    let checkpoint = Checkpoint::new(monitor);
     let mut finished = Vec::new();
     let mut waiting = vec![(chart, mapped)];
     while let Some((chart, mapped)) = waiting.pop() {
-        let done = finish(mapped, host);
-        pace.end()?;
-        match split_if_stretched(mesh, &chart, &done.certified, settings, host)? {
+        let done = finish(mapped, monitor);
+        checkpoint.end()?;
+        match split_if_stretched(mesh, &chart, &done.certified, settings, monitor)? {
             None => finished.push((chart, done)),
             Some(parts) => {
                 for part in parts.into_iter().rev() {
-                    waiting.extend(map_or_split(mesh, part, order, settings, host)?.into_iter().rev());
+                    waiting.extend(map_or_split(mesh, part, order, settings, monitor)?.into_iter().rev());
                 }
             }
         }
@@ -301,12 +300,12 @@ fn split_if_stretched(
     chart: &Chart,
     map: &CertifiedMap,
     settings: &decompose::Settings,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Option<Vec<Chart>>, decompose::Error> {
     if distortion::area_ratio(chart, map) <= settings.max_area_ratio {
         return Ok(None);
     }
-    decompose::split(mesh, chart, Some(&distortion::log_scales(chart, map)), settings, host)
+    decompose::split(mesh, chart, Some(&distortion::log_scales(chart, map)), settings, monitor)
 }
 
 /// The part of a map that is published: the chart without its fans.
@@ -325,7 +324,7 @@ mod tests {
         let mesh = repair(soup, &Default::default()).expect("repairs").mesh;
         let whole = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").into_charts();
         let settings = decompose::Settings { feature_angle: None, ..Default::default() };
-        let cut = |chart| map_or_split(&mesh, chart, Order::Quadratic, &settings, &Alone).expect("maps");
+        let cut = |chart| map_or_split(&mesh, chart, Order::Quadratic, &settings, &NoMonitor).expect("maps");
         let charts = whole.into_iter().flat_map(cut).map(|(chart, _)| chart).collect();
         (mesh, charts)
     }
@@ -336,7 +335,7 @@ mod tests {
         assert!(strips.len() >= 2, "{}", strips.len());
         for strip in &strips {
             assert!(strip.holes().is_empty());
-            let natural = crate::map::natural::natural(&mesh, strip, f64::MAX, &Alone).expect("it unrolls");
+            let natural = crate::map::natural::natural(&mesh, strip, f64::MAX, &NoMonitor).expect("it unrolls");
             assert!(natural.distortion.conformal_p99 < 4.0, "{:?}", natural.distortion);
         }
         let (_, whole) = parts(&shapes::tube(36, 6, 3.0));
@@ -355,7 +354,7 @@ mod tests {
     fn a_tall_box_falls_into_parts_that_unroll_and_a_low_one_stays_whole() {
         let (mesh, walls) = parts(&open_box(100.0));
         assert!((2..=3).contains(&walls.len()), "{}", walls.len());
-        let unrolls = |part| crate::map::natural::natural(&mesh, part, f64::MAX, &Alone).is_some();
+        let unrolls = |part| crate::map::natural::natural(&mesh, part, f64::MAX, &NoMonitor).is_some();
         assert!(walls.iter().all(unrolls));
         let (_, whole) = parts(&open_box(12.0));
         assert_eq!(whole.len(), 1, "it stretches, but no more than others");
@@ -367,13 +366,13 @@ mod tests {
         let settings = decompose::Settings { max_area_ratio: 5e5, feature_angle: None, ..Default::default() };
         let disk =
             decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk").into_charts().remove(0);
-        let parts = map_or_split(&mesh, disk, Order::Quadratic, &settings, &Alone).expect("maps");
+        let parts = map_or_split(&mesh, disk, Order::Quadratic, &settings, &NoMonitor).expect("maps");
         let [(chart, mapped)] = &parts[..] else { panic!("{} parts", parts.len()) };
         let ratio = |(chart, done): &(Chart, CertifiedChart)| distortion::area_ratio(chart, &done.certified);
         let whole = (chart.clone(), finish_chart(mapped.clone()));
         assert!(ratio(&whole) > settings.max_area_ratio, "neither linear nor harmonic map foretell it");
-        let finished =
-            finish_or_split(&mesh, chart.clone(), mapped.clone(), Order::Quadratic, &settings, &Alone).expect("maps");
+        let finished = finish_or_split(&mesh, chart.clone(), mapped.clone(), Order::Quadratic, &settings, &NoMonitor)
+            .expect("maps");
         assert!(finished.len() > 1 && finished.iter().all(|f| ratio(f) <= settings.max_area_ratio));
         assert_eq!(finished.iter().map(|f| f.0.triangles().len()).sum::<usize>(), mesh.triangles().len());
     }

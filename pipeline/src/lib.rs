@@ -22,8 +22,8 @@
 //!
 //! # Cancelling, taking turns, and memory
 //!
-//! Whatever can take long asks a [`monitor::Host`] many times a second whether to go on, and reserves memory from it before
-//! it factorises. [`monitor::Alone`] always goes on.
+//! Whatever can take long asks a [`monitor::Monitor`] many times a second whether to go on, and reserves memory from it before
+//! it factorises. [`monitor::NoMonitor`] always goes on.
 //!
 //! # What is not
 //!
@@ -35,12 +35,12 @@
 //! # Example
 //!
 //! ```
-//! use planish_core::monitor::Alone;
+//! use planish_core::monitor::NoMonitor;
 //! use planish_core::{Order, decompose, finish_chart, map_chart, repair, shapes};
 //!
 //! let soup = shapes::disk(8);
 //! let surface = repair(&soup, &Default::default())?.mesh;
-//! let atlas = decompose(&surface, &Default::default(), &Alone)?;
+//! let atlas = decompose(&surface, &Default::default(), &NoMonitor)?;
 //! for chart in atlas.charts() {
 //!     let done = finish_chart(map_chart(chart, Order::Quadratic)?);
 //!     let certificate = done.certified.certificate();

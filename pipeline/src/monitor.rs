@@ -1,8 +1,9 @@
-//! What surrounds a computation: whether its result is still wanted, whose turn it is, and how much memory it may take.
+//! What watches over a computation: whether its result is still wanted, whose turn it is, and how much memory it may take.
 //!
-//! The core knows no thread and no clock. It asks a [`Host`] at safe points, many times a second, and waits there as long
-//! as the host lets it: so a computation can be cancelled, or let others pass. What it computes does not depend on the
-//! answers, except that a cancelled computation has no result but [`Cancelled`].
+//! The core knows no thread and no clock. It asks a [`Monitor`] at safe points, many times a second, and waits there as
+//! long as the monitor lets it: so a computation can be interrupted, or let others pass. What it computes does not depend
+//! on the answers, except that an interrupted computation has no result but [`Interrupted`]: whatever can be interrupted
+//! returns that as an error, and nobody sees a value that was not computed.
 //!
 //! Memory is reserved before a sparse system is factorised, which takes more of it than all else together. **A
 //! computation holds at most one reservation at a time, and is at no safe point while it holds one**: each is made and
@@ -11,12 +12,12 @@
 
 use std::cell::Cell;
 
-/// What surrounds a computation. It may be asked by many of them at once; one that cancels some but not others is a
-/// host for each.
-pub trait Host: Sync {
+/// What watches over a computation. It may be asked by many of them at once; where some are to be interrupted and others
+/// not, each has a monitor of its own.
+pub trait Monitor: Sync {
     /// A safe point: whether the result is still wanted. May block for a while, when it is the turn of others. Once the
     /// answer is no it must stay so: a computation that stops early relies on it when it asks once more at its end.
-    fn go_on(&self) -> bool;
+    fn should_continue(&self) -> bool;
 
     /// Waits until `bytes` of memory may be taken. One request may be larger than any budget: then it should be granted
     /// when nothing else is reserved. Where the result is not wanted any more it should be granted at once.
@@ -28,10 +29,10 @@ pub trait Host: Sync {
 
 /// Nobody waits, nothing is limited.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Alone;
+pub struct NoMonitor;
 
-impl Host for Alone {
-    fn go_on(&self) -> bool {
+impl Monitor for NoMonitor {
+    fn should_continue(&self) -> bool {
         true
     }
 
@@ -42,42 +43,42 @@ impl Host for Alone {
 
 /// The result was not wanted any more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the computation was cancelled")]
-pub struct Cancelled;
+#[error("the computation was interrupted")]
+pub struct Interrupted;
 
 /// Reserved memory, given back when this is dropped.
 pub struct Reserved<'a> {
-    host: &'a dyn Host,
+    monitor: &'a dyn Monitor,
     bytes: u64,
 }
 
 impl<'a> Reserved<'a> {
     /// Waits for the memory.
-    pub fn new(host: &'a dyn Host, bytes: u64) -> Self {
-        host.reserve(bytes);
-        Self { host, bytes }
+    pub fn new(monitor: &'a dyn Monitor, bytes: u64) -> Self {
+        monitor.reserve(bytes);
+        Self { monitor, bytes }
     }
 }
 
 impl Drop for Reserved<'_> {
     fn drop(&mut self) {
-        self.host.release(self.bytes);
+        self.monitor.release(self.bytes);
     }
 }
 
 /// How much work is done between two questions: so many triangles looked at, which take a few milliseconds.
 const WORK: usize = 20_000;
 
-/// A host as the loops of a computation see it: they tell of every bit of work, and it is asked once in a while.
-pub(crate) struct Pace<'a> {
-    pub host: &'a dyn Host,
+/// A monitor as the loops of a computation see it: they tell of every bit of work, and it is asked once in a while.
+pub(crate) struct Checkpoint<'a> {
+    pub monitor: &'a dyn Monitor,
     done: Cell<usize>,
     over: Cell<bool>,
 }
 
-impl<'a> Pace<'a> {
-    pub(crate) fn new(host: &'a dyn Host) -> Self {
-        Self { host, done: Cell::new(0), over: Cell::new(false) }
+impl<'a> Checkpoint<'a> {
+    pub(crate) fn new(monitor: &'a dyn Monitor) -> Self {
+        Self { monitor, done: Cell::new(0), over: Cell::new(false) }
     }
 
     /// Whether to go on after `work`, in triangles looked at.
@@ -85,18 +86,18 @@ impl<'a> Pace<'a> {
         self.done.set(self.done.get() + work);
         if self.done.get() >= WORK && !self.over.get() {
             self.done.set(0);
-            self.over.set(!self.host.go_on());
+            self.over.set(!self.monitor.should_continue());
         }
         !self.over.get()
     }
 
     /// As [`Self::goes_on`].
-    pub(crate) fn after(&self, work: usize) -> Result<(), Cancelled> {
-        if self.goes_on(work) { Ok(()) } else { Err(Cancelled) }
+    pub(crate) fn after(&self, work: usize) -> Result<(), Interrupted> {
+        if self.goes_on(work) { Ok(()) } else { Err(Interrupted) }
     }
 
     /// Asks at once: before a result is returned.
-    pub(crate) fn end(&self) -> Result<(), Cancelled> {
+    pub(crate) fn end(&self) -> Result<(), Interrupted> {
         self.after(WORK)
     }
 }
@@ -135,8 +136,8 @@ mod tests {
         }
     }
 
-    impl Host for Watchful {
-        fn go_on(&self) -> bool {
+    impl Monitor for Watchful {
+        fn should_continue(&self) -> bool {
             assert_eq!(self.reserved.load(Relaxed), 0, "no safe point while memory is reserved");
             self.asked.fetch_add(1, Relaxed) < self.patience
         }
@@ -165,11 +166,11 @@ mod tests {
     type Maps = Vec<(Vec<FaceId>, PlanarMap)>;
 
     /// The whole story.
-    fn maps(mesh: &SurfaceMesh, settings: &decompose::Settings, host: &dyn Host) -> Result<Maps, SplitError> {
+    fn maps(mesh: &SurfaceMesh, settings: &decompose::Settings, monitor: &dyn Monitor) -> Result<Maps, SplitError> {
         let mut all = Vec::new();
-        for chart in decompose(mesh, settings, host)?.into_charts() {
-            for (chart, mapped) in map_or_split(mesh, chart, Order::Quadratic, settings, host)? {
-                let done = finish_or_split(mesh, chart, mapped, Order::Quadratic, settings, host)?;
+        for chart in decompose(mesh, settings, monitor)?.into_charts() {
+            for (chart, mapped) in map_or_split(mesh, chart, Order::Quadratic, settings, monitor)? {
+                let done = finish_or_split(mesh, chart, mapped, Order::Quadratic, settings, monitor)?;
                 all.extend(done.into_iter().map(|(c, d)| (c.faces().to_vec(), d.certified.map().clone())));
             }
         }
@@ -177,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_is_cancelled_ends_as_cancelled_and_whatever_is_not_does_not_depend_on_the_host() {
+    fn whatever_is_interrupted_ends_as_that_and_whatever_is_not_does_not_depend_on_the_monitor() {
         let ratio =
             |max_area_ratio: f64| decompose::Settings { max_area_ratio, feature_angle: None, ..Default::default() };
         for (soup, settings) in [
@@ -193,15 +194,15 @@ mod tests {
         ] {
             let mesh = surface(&soup);
             let patient = Watchful::new(usize::MAX);
-            let wanted = maps(&mesh, &settings, &Alone).expect("maps");
+            let wanted = maps(&mesh, &settings, &NoMonitor).expect("maps");
             assert!(maps(&mesh, &settings, &patient).expect("maps") == wanted);
             assert!(patient.most() > 0);
             let asked = patient.asked.into_inner();
             for patience in (0..asked).step_by(asked.div_ceil(6)).chain([asked - 1]) {
-                let host = Watchful::new(patience);
-                let got = maps(&mesh, &settings, &host);
-                assert!(matches!(got, Err(SplitError::Cancelled)), "after {patience} of {asked} answers");
-                host.most();
+                let monitor = Watchful::new(patience);
+                let got = maps(&mesh, &settings, &monitor);
+                assert!(matches!(got, Err(SplitError::Interrupted(_))), "after {patience} of {asked} answers");
+                monitor.most();
             }
             assert!(maps(&mesh, &settings, &Watchful::new(asked)).expect("maps") == wanted);
         }
@@ -216,32 +217,32 @@ mod tests {
             let mut values = pattern.zeros();
             (0..elements.len()).for_each(|e| pattern.add(&mut values, e, &spring));
             let analysis = pattern.analyse().expect("small");
-            let host = Watchful::new(usize::MAX);
-            match analysis.factorise(&values, &host) {
+            let monitor = Watchful::new(usize::MAX);
+            match analysis.factorise(&values, &monitor) {
                 Ok(factor) => {
-                    assert!(host.reserved.load(Relaxed) as usize >= 8 * analysis.factor_entries());
+                    assert!(monitor.reserved.load(Relaxed) as usize >= 8 * analysis.factor_entries());
                     drop(factor);
                 }
                 Err(error) => assert_eq!(error, sparse::Error::Singular { unknowns: 2 }),
             }
-            assert!(host.most() >= 8 * analysis.factor_entries());
+            assert!(monitor.most() >= 8 * analysis.factor_entries());
             let broken = catch_unwind(AssertUnwindSafe(|| {
-                let _factor = analysis.factorise(&values, &host);
+                let _factor = analysis.factorise(&values, &monitor);
                 panic!("while it is held");
             }));
             assert!(broken.is_err());
-            host.most();
+            monitor.most();
         }
     }
 
     #[test]
     fn general_systems_reserve_an_estimate() {
-        let host = Watchful::new(usize::MAX);
+        let monitor = Watchful::new(usize::MAX);
         let chart = whole(&surface(&shapes::disk(8)));
-        mean_value_map(&chart, &Boundary::circle(&chart, Mids::Arc), &host).expect("maps");
-        assert!(host.most() > 0);
+        mean_value_map(&chart, &Boundary::circle(&chart, Mids::Arc), &monitor).expect("maps");
+        assert!(monitor.most() > 0);
         let singular = [(0, 0, 1.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 1.0)];
-        assert!(solve_general(2, &singular, &mut [1.0, 2.0], 1, &host).is_err());
-        host.most();
+        assert!(solve_general(2, &singular, &mut [1.0, 2.0], 1, &monitor).is_err());
+        monitor.most();
     }
 }

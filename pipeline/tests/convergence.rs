@@ -5,7 +5,7 @@ use planish_core::map::boundary::Boundary;
 use planish_core::map::closed::ClosedChart;
 use planish_core::map::linear::harmonic_places;
 use planish_core::map::quadratic::quadratic_map;
-use planish_core::monitor::Alone;
+use planish_core::monitor::NoMonitor;
 use planish_core::vec3::{Vec3, midpoint, triangle_area};
 use planish_core::{decompose, repair, shapes};
 
@@ -37,8 +37,8 @@ fn errors(rings: u32) -> [f64; 2] {
     let vertices: Vec<_> = chart.outer().iter().map(|h| exact(ends(h)[0])).collect();
     let mids: Vec<_> = chart.outer().iter().map(|h| exact(midpoint(ends(h)[0], ends(h)[1]))).collect();
     let boundary = Boundary::through(&chart, &vertices, &mids).expect("one per node");
-    let linear = harmonic_places(&chart, &boundary, &Alone).expect("solves");
-    let quadratic = quadratic_map(&chart, &boundary, &Alone).expect("solves");
+    let linear = harmonic_places(&chart, &boundary, &NoMonitor).expect("solves");
+    let quadratic = quadratic_map(&chart, &boundary, &NoMonitor).expect("solves");
     let mut squares = [0.0; 2];
     for (f, t) in chart.triangles().iter().enumerate() {
         let corners = t.map(place);

@@ -9,7 +9,7 @@ use planish_core::map::closed::ClosedChart;
 use planish_core::map::linear::{self, Method, folded, harmonic_places, linear_map, mean_value_map};
 use planish_core::map::quadratic::{QuadraticMap, quadratic_map};
 use planish_core::mesh::TriangleSoup;
-use planish_core::monitor::Alone;
+use planish_core::monitor::NoMonitor;
 use planish_core::untangle::untangle;
 use planish_core::vec3::{Vec3, distance};
 use planish_core::{decompose, repair, shapes};
@@ -76,14 +76,14 @@ impl Example {
     }
 
     fn quadratic(&self, mids: Mids) -> QuadraticMap {
-        quadratic_map(&self.chart, &self.boundary(mids), &Alone).expect("solves")
+        quadratic_map(&self.chart, &self.boundary(mids), &NoMonitor).expect("solves")
     }
 
     /// The harmonic linear map folds, both repaired ones do not, and the quadratic one ends certified.
     fn passes_all_states(&self) {
         let boundary = self.boundary(Mids::Chord);
-        assert_eq!(folded(&self.chart, &harmonic_places(&self.chart, &boundary, &Alone).expect("solves")).len(), 1);
-        let m_matrix = linear_map(&self.chart, &boundary, &Alone).expect("maps");
+        assert_eq!(folded(&self.chart, &harmonic_places(&self.chart, &boundary, &NoMonitor).expect("solves")).len(), 1);
+        let m_matrix = linear_map(&self.chart, &boundary, &NoMonitor).expect("maps");
         assert_eq!((m_matrix.method(), m_matrix.folded()), (Method::MMatrix, 1));
         for mids in [Mids::Chord, Mids::Arc] {
             let mut boundary = self.boundary(mids);
@@ -92,7 +92,7 @@ impl Example {
             let start = m_matrix.raised(&self.chart, &boundary);
             let harmonic = self.quadratic(mids);
             assert!(!harmonic.invalid().is_empty());
-            let got = untangle(&self.chart, &start, &harmonic, &Alone);
+            let got = untangle(&self.chart, &start, &harmonic, &NoMonitor);
             assert!(got.report.energy < got.report.energy_start && got.report.energy > got.report.energy_harmonic);
             let cells = (0..self.chart.triangles().len()).map(|f| self.chart.nodes(f).map(|n| n as u32)).collect();
             let proven = prove(PlanarMap { cells, nodes: got.nodes, hole_centres: got.hole_centres });
@@ -114,10 +114,10 @@ fn close2(got: GridPoint, want: [f64; 2]) {
 fn f5_in_every_state() {
     let example = f5();
     let boundary = example.boundary(Mids::Chord);
-    let cotangent = harmonic_places(&example.chart, &boundary, &Alone).expect("solves");
+    let cotangent = harmonic_places(&example.chart, &boundary, &NoMonitor).expect("solves");
     close2(cotangent[4], [-85.0 / 207.0, -128.0 / 207.0]);
     close(example.doubled_area(&cotangent, [4, 2, 3]), -2.0 / 69.0);
-    let mean_value = mean_value_map(&example.chart, &boundary, &Alone).expect("maps");
+    let mean_value = mean_value_map(&example.chart, &boundary, &NoMonitor).expect("maps");
     close2(mean_value.places()[4], [-0.321944758, -0.553011927]);
     let chords = example.quadratic(Mids::Chord);
     close(example.least_det(chords.nodes(), [4, 2, 3]), -0.049704693);
@@ -130,10 +130,13 @@ fn f5_in_every_state() {
 fn t4_in_every_state() {
     let example = star(&shapes::folding_three());
     let boundary = example.boundary(Mids::Chord);
-    let cotangent = harmonic_places(&example.chart, &boundary, &Alone).expect("solves");
+    let cotangent = harmonic_places(&example.chart, &boundary, &NoMonitor).expect("solves");
     close2(cotangent[0], [-0.478019341, 0.824687131]);
     close(example.doubled_area(&cotangent, [0, 2, 3]), -0.17014829);
-    close2(mean_value_map(&example.chart, &boundary, &Alone).expect("maps").places()[0], [-0.281751830, 0.398289848]);
+    close2(
+        mean_value_map(&example.chart, &boundary, &NoMonitor).expect("maps").places()[0],
+        [-0.281751830, 0.398289848],
+    );
     close(example.least_det(example.quadratic(Mids::Chord).nodes(), [0, 2, 3]), -0.041042086);
     close(example.least_det(example.quadratic(Mids::Arc).nodes(), [0, 2, 3]), -0.071451738);
     example.passes_all_states();
@@ -143,11 +146,14 @@ fn t4_in_every_state() {
 fn p6_in_every_state() {
     let example = star(&shapes::folding_six());
     let boundary = example.boundary(Mids::Chord);
-    let cotangent = harmonic_places(&example.chart, &boundary, &Alone).expect("solves");
+    let cotangent = harmonic_places(&example.chart, &boundary, &NoMonitor).expect("solves");
     close2(cotangent[0], [-0.805064845, 0.403552024]);
     // Vertices 1 to 6 are the ring (8,1) (6,5) (2,9) (1,5) (-7,-3) (-1,-5).
     close(example.doubled_area(&cotangent, [0, 4, 5]), -0.29409754);
-    close2(mean_value_map(&example.chart, &boundary, &Alone).expect("maps").places()[0], [-0.128596522, -0.106231255]);
+    close2(
+        mean_value_map(&example.chart, &boundary, &NoMonitor).expect("maps").places()[0],
+        [-0.128596522, -0.106231255],
+    );
     close(example.least_det(example.quadratic(Mids::Chord).nodes(), [0, 3, 4]), -0.212699827);
     let arcs = example.quadratic(Mids::Arc);
     close(example.least_det(arcs.nodes(), [0, 2, 3]), -0.017853576);
@@ -188,7 +194,7 @@ fn radii(soup: &TriangleSoup) -> Vec<f64> {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
     let chart =
         ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
-    let map = quadratic_map(&chart, &Boundary::circle(&chart, Mids::Arc), &Alone).expect("solves");
+    let map = quadratic_map(&chart, &Boundary::circle(&chart, Mids::Arc), &NoMonitor).expect("solves");
     let mut radii = vec![-1.0; soup.points().len()];
     for v in 0..mesh.points().len() {
         let [x, y] = map.nodes()[v].uv();

@@ -14,7 +14,7 @@ use crate::stages::{self, guard};
 use crate::vitals;
 use crossbeam_channel::Sender;
 use parking_lot::{Mutex, RwLock};
-use planish_core::monitor::Host;
+use planish_core::monitor::Monitor;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -148,7 +148,11 @@ impl Travel {
 
     /// Does the work of a stage: in its turn, its processor time booked. A panic is a failure of the job; what comes
     /// out for a job that nobody wants any more is dropped.
-    pub fn compute<T>(&self, stage: Stage, work: impl FnOnce(&dyn Host) -> Result<T, Stopped>) -> Result<T, Stopped> {
+    pub fn compute<T>(
+        &self,
+        stage: Stage,
+        work: impl FnOnce(&dyn Monitor) -> Result<T, Stopped>,
+    ) -> Result<T, Stopped> {
         self.reached(stage);
         let seat = Seat::take(self);
         let _in_stage = self.in_stage(stage);
@@ -238,8 +242,8 @@ impl Drop for Seat<'_> {
     }
 }
 
-impl Host for Seat<'_> {
-    fn go_on(&self) -> bool {
+impl Monitor for Seat<'_> {
+    fn should_continue(&self) -> bool {
         let Travel { shared, turn, job, .. } = self.0;
         shared.step();
         if job.is_wanted() {
@@ -309,8 +313,8 @@ pub(super) mod tests {
         let (shared, ended, _out) = shared(1 << 20);
         let travel = begin(&shared);
         assert_eq!(shared.board.running().len(), 1);
-        let stopped = travel.compute(Stage::Map, |host| -> Result<(), Stopped> {
-            let _held = planish_core::monitor::Reserved::new(host, 1 << 19);
+        let stopped = travel.compute(Stage::Map, |monitor| -> Result<(), Stopped> {
+            let _held = planish_core::monitor::Reserved::new(monitor, 1 << 19);
             panic!("a fault, for the test");
         });
         assert!(matches!(stopped, Err(Stopped::For(reason)) if reason.code == Code::Internal));
@@ -328,10 +332,10 @@ pub(super) mod tests {
     fn what_nobody_wants_is_not_computed_or_dropped() {
         let (shared, ended, _out) = shared(1 << 20);
         let travel = begin(&shared);
-        let stopped = travel.compute(Stage::Map, |host| {
-            assert!(host.go_on());
+        let stopped = travel.compute(Stage::Map, |monitor| {
+            assert!(monitor.should_continue());
             travel.job.cancel();
-            assert!(!host.go_on());
+            assert!(!monitor.should_continue());
             Ok(())
         });
         assert_eq!(stopped, Err(Stopped::Unwanted));
@@ -348,9 +352,9 @@ pub(super) mod tests {
         let travels = [begin(&shared), begin(&shared)];
         let rounds = |travel: &Arc<Travel>| {
             for _ in 0..200 {
-                let done = travel.compute(Stage::Map, |host| {
-                    let _held = planish_core::monitor::Reserved::new(host, 3 << 18);
-                    host.go_on();
+                let done = travel.compute(Stage::Map, |monitor| {
+                    let _held = planish_core::monitor::Reserved::new(monitor, 3 << 18);
+                    monitor.should_continue();
                     Ok(())
                 });
                 assert_eq!(done, Ok(()));

@@ -14,7 +14,7 @@ use crate::decompose;
 use crate::map::natural;
 use crate::measure::distortion;
 use crate::mesh::SurfaceMesh;
-use crate::monitor::Host;
+use crate::monitor::Monitor;
 
 /// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
 /// of a terrain, at 10 to 50, and soccerball_g31, at 80, are well left whole.
@@ -45,7 +45,7 @@ pub(super) struct Cutter<'a> {
     pub(super) mesh: &'a SurfaceMesh,
     pub(super) order: Order,
     pub(super) settings: &'a decompose::Settings,
-    pub(super) host: &'a dyn Host,
+    pub(super) monitor: &'a dyn Monitor,
 }
 
 /// What comes of an attempt to map a chart.
@@ -132,22 +132,22 @@ impl Cutter<'_> {
     /// # Errors
     /// [`SplitError`].
     pub(super) fn attempt(&self, chart: &Chart) -> Result<Attempt, SplitError> {
-        let &Self { mesh, order, settings, host } = self;
+        let &Self { mesh, order, settings, monitor } = self;
         if let Some(ends) = decompose::contact(mesh, chart) {
-            return Ok(Attempt::Split(decompose::separate(mesh, chart, ends, settings, host)?));
+            return Ok(Attempt::Split(decompose::separate(mesh, chart, ends, settings, monitor)?));
         }
-        let error = match map_within(chart, order, settings.max_area_ratio, host) {
+        let error = match map_within(chart, order, settings.max_area_ratio, monitor) {
             Ok(map) => return Ok(Attempt::Mapped(Box::new(map))),
-            Err(MapError::Cancelled) => return Err(SplitError::Cancelled),
+            Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
             Err(error) => error,
         };
-        let parts = decompose::split(mesh, chart, error.log_scales(), settings, host)?;
+        let parts = decompose::split(mesh, chart, error.log_scales(), settings, monitor)?;
         Ok(parts.map_or(Attempt::Single, Attempt::Split))
     }
 
     /// `on_disk` is how much the map of the chart stretches.
     fn suits(&self, chart: &Chart, on_disk: f64, bound: f64) -> Suits {
-        let natural = natural::natural(self.mesh, chart, on_disk, self.host);
+        let natural = natural::natural(self.mesh, chart, on_disk, self.monitor);
         if natural.is_some_and(|n| n.distortion.conformal_p99 <= bound) {
             Suits::Natural
         } else if on_disk <= bound {
@@ -160,10 +160,10 @@ impl Cutter<'_> {
     /// The chart cut once: through its first hole, or where the area scale changes. None for a single triangle.
     fn halves(&self, chart: &Chart, map: &MappedChart) -> Result<Option<Vec<Chart>>, decompose::Error> {
         match left_of_hole(map) {
-            Some(is_left) => decompose::halve(self.mesh, chart, &is_left, self.settings, self.host).map(Some),
+            Some(is_left) => decompose::halve(self.mesh, chart, &is_left, self.settings, self.monitor).map(Some),
             None => {
                 let scales = distortion::log_scales(chart, &map.certified_start);
-                decompose::split(self.mesh, chart, Some(&scales), self.settings, self.host)
+                decompose::split(self.mesh, chart, Some(&scales), self.settings, self.monitor)
             }
         }
     }

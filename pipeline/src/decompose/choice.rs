@@ -11,7 +11,7 @@ use super::network::Network;
 use super::search::Found;
 use super::straighten::{RELAXED, relax};
 use super::voronoi::Cells;
-use crate::monitor::Cancelled;
+use crate::monitor::Interrupted;
 
 /// A chart is taken to need at most this many more.
 const MOST: f64 = 9.0;
@@ -27,7 +27,7 @@ pub(super) struct Choice<'a> {
 
 impl Choice<'_> {
     /// Per cell its chart.
-    pub(super) fn of(&self, found: &Found) -> Result<Cells, Cancelled> {
+    pub(super) fn of(&self, found: &Found) -> Result<Cells, Interrupted> {
         let mut best: Vec<usize> = found.ranked.iter().map(|ways| ways.first().map_or(0, |w| w.1)).collect();
         let mut needed = vec![usize::MAX; best.len()];
         // Ways are ranked by their charts, which are never more than those needed: the rest cannot be better then.
@@ -53,15 +53,15 @@ impl Choice<'_> {
 
     /// Per component that is `open`, the charts of the ways that are `tried`, once their seams are straight and the
     /// charts that are too distorted then are split.
-    fn needed(&self, found: &Found, tried: &[usize], open: &[bool]) -> Result<Vec<usize>, Cancelled> {
+    fn needed(&self, found: &Found, tried: &[usize], open: &[bool]) -> Result<Vec<usize>, Interrupted> {
         let charts = found.charts(tried);
         let mut component = vec![0; charts.count];
         charts.of.iter().zip(&found.components.of).for_each(|(chart, c)| component[*chart as usize] = *c as usize);
         let labels = self.cells.of.iter().map(|c| charts.of[*c as usize]).collect();
         let mut network = Network::new(self.dual, labels, self.limits).keeping(RELAXED);
-        self.dual.visited_all()?;
+        self.dual.checkpoint()?;
         relax(&mut network, 1.0, |label| open[component[label as usize]]);
-        self.dual.visited_all()?;
+        self.dual.checkpoint()?;
         let mut counts = vec![0; tried.len()];
         for (component, verdict) in component.into_iter().zip(judge(&network, self.cells)) {
             counts[component] += self.parts(verdict);

@@ -100,7 +100,7 @@ fn domains(network: &Network, places: &[Place]) -> (Vec<f64>, Vec<Option<u32>>) 
         if so_far > distance[node as usize] {
             continue;
         }
-        if !dual.pace.goes_on(1) {
+        if !dual.checkpoint.goes_on(1) {
             break;
         }
         network.each_out(node as usize, |h: HalfEdgeId| {

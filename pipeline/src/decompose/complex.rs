@@ -226,7 +226,7 @@ mod tests {
     use crate::decompose::patches::compact_cells;
     use crate::decompose::regions::Regions;
     use crate::mesh::{SurfaceMesh, TriangleSoup};
-    use crate::monitor::Alone;
+    use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
     use crate::shapes::{self, Random};
     use crate::topology::{Census, EdgeTable, Umbrellas};
@@ -267,8 +267,8 @@ mod tests {
         let soups = [shapes::sphere(8), shapes::disk_with_holes(17, 3), shapes::ring_torus(14, 9), shapes::moebius(20)];
         let meshes: Vec<SurfaceMesh> = soups.iter().chain([&shapes::finger(12, 2)]).map(surface).collect();
         for (mesh, count) in meshes.iter().flat_map(|m| [3, 7, 25, 60].map(|count| (m, count))) {
-            let dual = Dual::new(mesh, &Alone);
-            let cells = compact_cells(&dual, |_| count, &dual.pace).expect("nobody cancels");
+            let dual = Dual::new(mesh, &NoMonitor);
+            let cells = compact_cells(&dual, |_| count, &dual.checkpoint).expect("nobody cancels");
             let complex = Complex::new(&dual, &cells);
             let mut random = Random(count as u64);
             let mut regions = Regions::new(&complex, (0..cells.count as u32).collect(), cells.count);
@@ -296,10 +296,10 @@ mod tests {
     fn half_arcs_are_two_sides_of_arcs_and_go_round_their_cells() {
         for soup in [shapes::sphere(8), shapes::disk_with_holes(17, 3), shapes::ring_torus(14, 9)] {
             let mesh = surface(&soup);
-            let dual = Dual::new(&mesh, &Alone);
+            let dual = Dual::new(&mesh, &NoMonitor);
             for count in [1, 2, 9, 40] {
                 let complex =
-                    Complex::new(&dual, &compact_cells(&dual, |_| count, &dual.pace).expect("nobody cancels"));
+                    Complex::new(&dual, &compact_cells(&dual, |_| count, &dual.checkpoint).expect("nobody cancels"));
                 for (a, arc) in complex.arcs.iter().enumerate() {
                     assert_eq!(complex.arcs[arc.next as usize].cell, arc.cell);
                     let Some(twin) = complex.arcs.get(arc.twin as usize) else { continue };

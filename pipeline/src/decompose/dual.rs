@@ -2,7 +2,7 @@
 
 use super::voronoi::Graph;
 use crate::mesh::SurfaceMesh;
-use crate::monitor::{Cancelled, Host, Pace};
+use crate::monitor::{Checkpoint, Interrupted, Monitor};
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 use crate::vec3::{Vec3, cross, distance, midpoint, sub};
 use std::collections::BTreeMap;
@@ -22,8 +22,8 @@ struct Side {
 /// A surface as decomposition sees it. Lengths are in the unit of the metric.
 pub(super) struct Dual<'a> {
     pub mesh: &'a SurfaceMesh,
-    /// The host of what is computed on the surface.
-    pub pace: Pace<'a>,
+    /// The monitor of what is computed on the surface.
+    pub checkpoint: Checkpoint<'a>,
     sides: Vec<Side>,
     /// Per edge 1 minus the cosine of its dihedral angle, at most 1, if it is a feature: no cell crosses it; else 0.
     pub sharpness: Vec<f64>,
@@ -38,7 +38,7 @@ pub(super) struct Dual<'a> {
 }
 
 impl<'a> Dual<'a> {
-    pub(super) fn new(mesh: &'a SurfaceMesh, host: &'a dyn Host) -> Self {
+    pub(super) fn new(mesh: &'a SurfaceMesh, monitor: &'a dyn Monitor) -> Self {
         let scale = mesh.metric().scale;
         let points: Vec<Vec3> = mesh.points().iter().map(|p| p.map(|c| c * scale)).collect();
         let triangles = mesh.triangles();
@@ -58,7 +58,7 @@ impl<'a> Dual<'a> {
             steps: Vec::new(),
             foes: BTreeMap::new(),
             mesh,
-            pace: Pace::new(host),
+            checkpoint: Checkpoint::new(monitor),
             points,
         };
         made.foes = made.find_foes();
@@ -67,8 +67,8 @@ impl<'a> Dual<'a> {
     }
 
     /// A safe point, after all triangles were looked at.
-    pub(super) fn visited_all(&self) -> Result<(), Cancelled> {
-        self.pace.after(self.areas.len())
+    pub(super) fn checkpoint(&self) -> Result<(), Interrupted> {
+        self.checkpoint.after(self.areas.len())
     }
 
     fn find_foes(&self) -> BTreeMap<HalfEdgeId, Vec<FaceId>> {

@@ -147,7 +147,7 @@ impl Work {
 mod tests {
     use super::*;
     use crate::mesh::TriangleSoup;
-    use crate::monitor::Alone;
+    use crate::monitor::NoMonitor;
     use crate::{Order, decompose, finish_chart, map_chart, repair};
 
     /// A square of n x n smaller ones, all cut along the same diagonal: two of its corners are ears.
@@ -165,7 +165,7 @@ mod tests {
     fn ears_are_split_and_the_surface_stays() {
         for (n, ears) in [(1, 1), (2, 2), (5, 2)] {
             let mesh = repair(&square(n), &Default::default()).expect("a surface").mesh;
-            let atlas = decompose(&mesh, &Default::default(), &Alone).expect("one chart");
+            let atlas = decompose(&mesh, &Default::default(), &NoMonitor).expect("one chart");
             let done = split_ears(&mesh, &atlas, usize::MAX).expect("legal").expect("ears");
             assert_eq!((done.split, done.mesh.points().len()), (ears, mesh.points().len() + ears));
             assert!((done.mesh.area() / mesh.area() - 1.0).abs() < 1e-14);

@@ -11,7 +11,7 @@
 use super::Settings;
 use super::dual::Dual;
 use crate::mesh::SurfaceMesh;
-use crate::monitor::{Cancelled, Host};
+use crate::monitor::{Interrupted, Monitor};
 use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId};
 use crate::vec3::{Vec3, dot, norm};
@@ -45,12 +45,12 @@ const BLUNT: f64 = 0.5;
 pub(super) fn with_features<'a>(
     mesh: &'a SurfaceMesh,
     settings: &Settings,
-    host: &'a dyn Host,
-) -> Result<(Dual<'a>, usize), Cancelled> {
-    let mut dual = Dual::new(mesh, host);
-    dual.visited_all()?;
+    monitor: &'a dyn Monitor,
+) -> Result<(Dual<'a>, usize), Interrupted> {
+    let mut dual = Dual::new(mesh, monitor);
+    dual.checkpoint()?;
     let count = settings.feature_angle.map_or(0, |angle| mark_features(&mut dual, angle));
-    dual.visited_all()?;
+    dual.checkpoint()?;
     Ok((dual, count))
 }
 
@@ -82,7 +82,7 @@ fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     }
     let kept: Vec<HalfEdgeId> = kept.into_iter().map(|k| k.0).collect();
     // Every time some patches are united with others, so that fewer are left.
-    while dual.visited_all().is_ok() && drop_small_patches(dual, &kept) {}
+    while dual.checkpoint().is_ok() && drop_small_patches(dual, &kept) {}
     drop_dangling(dual, &kept);
     dual.sharpness.iter().filter(|s| **s > 0.0).count()
 }

@@ -39,23 +39,23 @@ pub(super) fn finish(
     let mut best = Judged::new(Network::new(dual, labels, limits), cells);
     let bands = if best.network.seams().next().is_some() { &BANDS[..] } else { &[] };
     for (round, band) in bands.iter().enumerate() {
-        dual.visited_all()?;
+        dual.checkpoint()?;
         let gaps = gaps(&best.network);
-        dual.visited_all()?;
+        dual.checkpoint()?;
         let clear = |h: HalfEdgeId| SHARE * gaps.clearance[dual.from(h)].min(gaps.clearance[dual.to(h)]);
         let breadth = |h: HalfEdgeId| clear(h).min(band * size(h));
         let step = Step { cells, largest: settings.max_area_ratio, gaps: &gaps, shrink: round == 0 };
         let Err(bad) = best.step(&step, breadth) else { continue };
         // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
         for part in [None].into_iter().chain((0..PARTS).map(Some)) {
-            dual.visited_all()?;
+            dual.checkpoint()?;
             let part_of = best.parts(&bad);
             let in_part = |h: HalfEdgeId| if part_of(h) == part { breadth(h) } else { 0.0 };
             let _kept_or_left = best.step(&step, in_part);
         }
     }
     let Judged { network, verdicts, .. } = best.unbent(cells);
-    dual.visited_all()?;
+    dual.checkpoint()?;
     let mut atlas = assemble(dual.mesh, &network.labels)?;
     choose_outer(&mut atlas, &verdicts);
     Ok(atlas)

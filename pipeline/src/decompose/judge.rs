@@ -22,7 +22,7 @@ pub(super) struct Verdict {
 
 /// The prediction for every label (none for labels without triangles, nor where nobody waits for it any more).
 pub(super) fn judge(network: &Network, cells: &Cells) -> Vec<Option<Verdict>> {
-    if network.dual.visited_all().is_err() {
+    if network.dual.checkpoint().is_err() {
         return vec![None; network.label_count()];
     }
     let (cut, labels) = cut(network, cells);
@@ -31,7 +31,7 @@ pub(super) fn judge(network: &Network, cells: &Cells) -> Vec<Option<Verdict>> {
     let mut regions = Regions::new(&complex, labels, network.label_count());
     let verdict = |label: usize| {
         let work = WORK_PER_CELL * regions.all[label].cells.len();
-        let outline = network.dual.pace.goes_on(work).then(|| regions.outline_of(label as u32))?;
+        let outline = network.dual.checkpoint.goes_on(work).then(|| regions.outline_of(label as u32))?;
         let (ratio, outer) = area_ratio(&complex, &graph, &regions.all[label].cells, &outline.loops);
         let arc = *outline.loops.get(outer)?.first()?;
         Some(Verdict { ratio, outer: complex.arcs[arc as usize].first })

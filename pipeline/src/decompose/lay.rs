@@ -182,7 +182,7 @@ mod tests {
     use crate::decompose::merge::Limits;
     use crate::decompose::patches::compact_cells;
     use crate::decompose::shortest::{Bounds, Goal, Tree};
-    use crate::monitor::Alone;
+    use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
     use crate::shapes::{self, Random};
 
@@ -227,8 +227,8 @@ mod tests {
             [(shapes::sphere(16), 6), (shapes::disk_with_holes(25, 3), 5), (shapes::ring_torus(24, 16), 9)]
         {
             let mesh = repair(&soup, &Settings::default()).expect("a surface is left").mesh;
-            let dual = Dual::new(&mesh, &Alone);
-            let cells = compact_cells(&dual, |_| charts, &dual.pace).expect("nobody cancels");
+            let dual = Dual::new(&mesh, &NoMonitor);
+            let cells = compact_cells(&dual, |_| charts, &dual.checkpoint).expect("nobody cancels");
             let largest = 11 * mesh.triangles().len() / charts / 10;
             let limits = Limits { area_ratio: 1e6, triangles: largest, strict_disks: false };
             let mut network = Network::new(&dual, cells.of, limits);

@@ -3,7 +3,7 @@
 
 use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
 use super::regions::{Regions, Shape, Union};
-use crate::monitor::{Cancelled, Pace};
+use crate::monitor::{Checkpoint, Interrupted};
 use crate::vec3::norm;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -73,17 +73,17 @@ pub(super) struct Merge<'a, 'b> {
     pub groups: Vec<u32>,
     /// Features block unions, but not that of a region around which there is no more of them, weighed by sharpness.
     pub least_outline: f64,
-    pub pace: &'b Pace<'b>,
+    pub checkpoint: &'b Checkpoint<'b>,
 }
 
 impl Merge<'_, '_> {
     /// Unites neighbours until no union is allowed. Ends because every union leaves one region less, and every
     /// candidate is judged once.
-    pub(super) fn run(&mut self) -> Result<(), Cancelled> {
+    pub(super) fn run(&mut self) -> Result<(), Interrupted> {
         let mut version = vec![0_u32; self.regions.all.len()];
         let mut heap = BinaryHeap::new();
         for a in 0..version.len() as u32 {
-            self.pace.after(self.regions.all[a as usize].boundary.len())?;
+            self.checkpoint.after(self.regions.all[a as usize].boundary.len())?;
             for b in self.regions.neighbours(a).into_iter().filter(|b| a < *b) {
                 heap.extend(self.candidate((a, b), &version));
             }
@@ -96,7 +96,7 @@ impl Merge<'_, '_> {
             let Some(ratio) = best.ratio else {
                 heap.extend(self.judged(best));
                 let cells = [a, b].map(|r| self.regions.all[r as usize].cells.len());
-                self.pace.after(WORK_PER_CELL * (cells[0] + cells[1]))?;
+                self.checkpoint.after(WORK_PER_CELL * (cells[0] + cells[1]))?;
                 continue;
             };
             let Some(union) = self.regions.union(a, b) else { continue };

@@ -44,7 +44,7 @@ mod voronoi;
 
 use crate::atlas::Atlas;
 use crate::mesh::SurfaceMesh;
-use crate::monitor::{Cancelled, Host};
+use crate::monitor::{Interrupted, Monitor};
 use crate::topology::HalfEdgeId;
 pub use assemble::assemble;
 use choice::Choice;
@@ -69,14 +69,8 @@ pub enum Error {
     #[error(transparent)]
     Illegal(#[from] Illegal),
     /// The atlas was not wanted any more.
-    #[error("the decomposition was cancelled")]
-    Cancelled,
-}
-
-impl From<Cancelled> for Error {
-    fn from(Cancelled: Cancelled) -> Self {
-        Self::Cancelled
-    }
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
 }
 
 /// What charts must respect.
@@ -103,19 +97,25 @@ impl Default for Settings {
 ///
 /// # Errors
 /// [`Error`].
-pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, host: &dyn Host) -> Result<Atlas, Error> {
-    let (dual, features) = with_features(mesh, settings, host)?;
+pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, monitor: &dyn Monitor) -> Result<Atlas, Error> {
+    let (dual, features) = with_features(mesh, settings, monitor)?;
     let limits = Limits::new(settings);
     let (cells, complex) = cells(&dual, &limits)?;
     let graph = CellGraph::new(&complex);
-    let search = Search { complex: &complex, graph: &graph, limits, bound: settings.max_area_ratio, pace: &dual.pace };
+    let search = Search {
+        complex: &complex,
+        graph: &graph,
+        limits,
+        bound: settings.max_area_ratio,
+        checkpoint: &dual.checkpoint,
+    };
     let choice = Choice { dual: &dual, cells: &cells, limits, bound: settings.max_area_ratio };
     let charts = choice.of(&search.run()?)?;
     let charts = search.absorb(charts, least_outline(&dual))?;
     let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
     let size = |h: HalfEdgeId| graph.area(cells.of[h.face().index()]).sqrt();
     let atlas = finish(&dual, labels, limits, settings, &cells, size)?;
-    dual.pace.end()?;
+    dual.checkpoint.end()?;
     Ok(Atlas { feature_edges: features, ..atlas })
 }
 
@@ -130,15 +130,15 @@ impl Limits {
 }
 
 /// Legal cells of about the same size, and their complex.
-fn cells(dual: &Dual, limits: &Limits) -> Result<(Cells, Complex), Cancelled> {
-    let cells = compact_cells(dual, |size| (size / 8).min(CELLS), &dual.pace)?;
-    dual.visited_all()?;
+fn cells(dual: &Dual, limits: &Limits) -> Result<(Cells, Complex), Interrupted> {
+    let cells = compact_cells(dual, |size| (size / 8).min(CELLS), &dual.checkpoint)?;
+    dual.checkpoint()?;
     let mut complex = Complex::default();
     let cells = bisect_until(dual, cells, |cells| {
         complex = Complex::new(dual, cells);
         legal(dual, &complex, limits)
     });
-    dual.visited_all()?;
+    dual.checkpoint()?;
     Ok((cells, complex))
 }
 

@@ -6,7 +6,7 @@
 //! all seeds, and are as exact as if seeds had been chosen among nodes.
 
 use super::voronoi::{Cells, Graph, nearest, seeds};
-use crate::monitor::{Cancelled, Pace};
+use crate::monitor::{Checkpoint, Interrupted};
 
 /// Patches to a cell.
 const SAMPLES: usize = 16;
@@ -18,13 +18,13 @@ const NONE: u32 = u32::MAX;
 pub(super) fn compact_cells<G: Graph>(
     graph: &G,
     wanted: impl Fn(usize) -> usize,
-    pace: &Pace,
-) -> Result<Cells, Cancelled> {
+    checkpoint: &Checkpoint,
+) -> Result<Cells, Interrupted> {
     let patches = Patches::new(graph, |size| size / (SAMPLES * wanted(size)).max(1));
-    pace.after(graph.len())?;
+    checkpoint.after(graph.len())?;
     let seeds = seeds(&patches, |part| wanted(part.iter().map(|p| patches.size(*p)).sum()));
     let nodes: Vec<usize> = seeds.iter().map(|p| patches.nodes[patches.starts[*p]] as usize).collect();
-    pace.after(graph.len())?;
+    checkpoint.after(graph.len())?;
     Ok(nearest(graph, &nodes))
 }
 
@@ -140,16 +140,17 @@ mod tests {
     use crate::decompose::dual::Dual;
     use crate::decompose::voronoi::farthest_first;
     use crate::mesh::TriangleSoup;
-    use crate::monitor::Alone;
+    use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
     use crate::shapes;
 
     fn check(soup: &TriangleSoup, wanted: usize) {
         let mesh = repair(soup, &Settings::default()).expect("a surface is left").mesh;
-        let dual = Dual::new(&mesh, &Alone);
-        for cells in
-            [compact_cells(&dual, |_| wanted, &dual.pace).expect("nobody cancels"), farthest_first(&dual, |_| wanted)]
-        {
+        let dual = Dual::new(&mesh, &NoMonitor);
+        for cells in [
+            compact_cells(&dual, |_| wanted, &dual.checkpoint).expect("nobody cancels"),
+            farthest_first(&dual, |_| wanted),
+        ] {
             let mut seen = vec![false; dual.len()];
             let mut found = vec![false; cells.count];
             for start in 0..dual.len() {
@@ -183,8 +184,8 @@ mod tests {
     #[test]
     fn cells_of_one_size_on_an_even_plate() {
         let mesh = repair(&shapes::flat_disk(60), &Settings::default()).expect("a surface is left").mesh;
-        let dual = Dual::new(&mesh, &Alone);
-        let cells = compact_cells(&dual, |_| 50, &dual.pace).expect("nobody cancels");
+        let dual = Dual::new(&mesh, &NoMonitor);
+        let cells = compact_cells(&dual, |_| 50, &dual.checkpoint).expect("nobody cancels");
         let mut sizes = vec![0; cells.count];
         cells.of.iter().for_each(|c| sizes[*c as usize] += 1);
         let mean = mesh.triangles().len() / 50;

@@ -10,7 +10,7 @@ use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
 use super::regions::{Outline, Region, Regions};
 use super::sides::{Axes, axes, faces};
 use super::voronoi::{Cells, bisect_until, farthest_first};
-use crate::monitor::{Cancelled, Pace};
+use crate::monitor::{Checkpoint, Interrupted};
 
 const BALANCED: Weights = Weights { ratio: 1.0, roundness: 0.6, spread: 0.5, shared: 0.0 };
 const COMPACT: Weights = Weights { ratio: 0.5, roundness: 0.6, spread: 0.5, shared: 1.0 };
@@ -52,7 +52,7 @@ pub(super) struct Search<'a> {
     pub limits: Limits,
     /// The largest area ratio of a chart.
     pub bound: f64,
-    pub pace: &'a Pace<'a>,
+    pub checkpoint: &'a Checkpoint<'a>,
 }
 
 /// A component is left whole up to this share of the largest area ratio: it has no seams that would change it.
@@ -89,7 +89,7 @@ impl Found {
 }
 
 impl Search<'_> {
-    pub(super) fn run(&self) -> Result<Found, Cancelled> {
+    pub(super) fn run(&self) -> Result<Found, Interrupted> {
         let components = farthest_first(self.graph, |_| 1);
         let whole = Regions::new(self.complex, components.of.clone(), components.count);
         let whole = self.fine(whole, WHOLE * self.bound);
@@ -117,7 +117,7 @@ impl Search<'_> {
         let judge = |(region, outline): (&Region, &Outline)| {
             let ratio = || area_ratio(self.complex, self.graph, &region.cells, &outline.loops).0;
             let allowed = || self.limits.allow(&regions.shape(region, outline)) && ratio() <= largest;
-            !self.pace.goes_on(WORK_PER_CELL * region.cells.len()) || allowed()
+            !self.checkpoint.goes_on(WORK_PER_CELL * region.cells.len()) || allowed()
         };
         regions.all.iter().zip(&outlines).map(judge).collect()
     }
@@ -129,7 +129,7 @@ impl Search<'_> {
         components: &Cells,
         axes: &[Axes],
         whole: &[bool],
-    ) -> Result<(Vec<u32>, Vec<Score>), Cancelled> {
+    ) -> Result<(Vec<u32>, Vec<Score>), Interrupted> {
         let is_whole = |cell: usize| whole[components.of[cell] as usize];
         let groups = farthest_first(self.graph, |part| if is_whole(part[0]) { 1 } else { way.regions });
         let groups = bisect_until(self.graph, groups, |groups| {
@@ -153,7 +153,7 @@ impl Search<'_> {
 
     /// Unites charts across features wherever these are not sharp and long enough to part them, whatever their
     /// component.
-    pub(super) fn absorb(&self, charts: Cells, least_outline: f64) -> Result<Cells, Cancelled> {
+    pub(super) fn absorb(&self, charts: Cells, least_outline: f64) -> Result<Cells, Interrupted> {
         let count = charts.count;
         let mut regions = Regions::new(self.complex, charts.of, count);
         self.merge(&mut regions, &mut vec![1.0; count], vec![0; count], BALANCED, least_outline)?;
@@ -167,9 +167,9 @@ impl Search<'_> {
         groups: Vec<u32>,
         weights: Weights,
         least_outline: f64,
-    ) -> Result<(), Cancelled> {
-        let (graph, limits, pace) = (self.graph, self.limits, self.pace);
-        Merge { regions, graph, limits, weights, ratios, groups, least_outline, pace }.run()
+    ) -> Result<(), Interrupted> {
+        let (graph, limits, checkpoint) = (self.graph, self.limits, self.checkpoint);
+        Merge { regions, graph, limits, weights, ratios, groups, least_outline, checkpoint }.run()
     }
 
     /// The score of every component.

@@ -117,7 +117,7 @@ impl Tree {
             if sum > so_far + ahead(self, node) {
                 continue;
             }
-            if !network.dual.pace.goes_on(1) {
+            if !network.dual.checkpoint.goes_on(1) {
                 return;
             }
             self.settled.push(node);
@@ -227,7 +227,7 @@ impl Bounds<'_> {
 mod tests {
     use super::*;
     use crate::decompose::merge::Limits;
-    use crate::monitor::Alone;
+    use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
     use crate::shapes::{self, Random};
 
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn bounds_do_not_hide_the_shortest_ways() {
         let mesh = repair(&shapes::bent_disk(16, 0.3, 0.2), &Settings::default()).expect("a surface is left").mesh;
-        let dual = Dual::new(&mesh, &Alone);
+        let dual = Dual::new(&mesh, &NoMonitor);
         let limits = Limits { area_ratio: 1e6, triangles: usize::MAX, strict_disks: false };
         let network = Network::new(&dual, vec![0; mesh.triangles().len()], limits);
         let inner: Vec<usize> = (0..mesh.points().len()).filter(|v| !network.is_open(*v)).collect();
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn a_star_finds_what_dijkstra_finds() {
         let mesh = repair(&shapes::bent_disk(16, 0.3, 0.2), &Settings::default()).expect("a surface is left").mesh;
-        let dual = Dual::new(&mesh, &Alone);
+        let dual = Dual::new(&mesh, &NoMonitor);
         let limits = Limits { area_ratio: 1e6, triangles: usize::MAX, strict_disks: false };
         let network = Network::new(&dual, vec![0; mesh.triangles().len()], limits);
         let band = vec![true; mesh.points().len()];

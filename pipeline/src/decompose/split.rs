@@ -13,7 +13,7 @@ use super::voronoi::{Cells, bisect_until, farthest_first};
 use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
 use crate::mesh::SurfaceMesh;
-use crate::monitor::Host;
+use crate::monitor::Monitor;
 use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
@@ -27,13 +27,13 @@ const OFF_CENTRE: f64 = 3.0;
 /// `log_scale` is the logarithm of the area scale of each triangle, where the chart has a map.
 ///
 /// # Errors
-/// [`Error::Illegal`]: a fault of planish; [`Error::Cancelled`].
+/// [`Error::Illegal`]: a fault of planish; [`Error::Interrupted`].
 pub fn split(
     mesh: &SurfaceMesh,
     chart: &Chart,
     log_scale: Option<&[f64]>,
     settings: &Settings,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Option<Vec<Chart>>, Error> {
     if chart.triangles().len() < 2 {
         return Ok(None);
@@ -42,7 +42,7 @@ pub fn split(
         let by_scale = log_scale.and_then(|s| across_protrusion(dual, s, limits));
         by_scale.unwrap_or_else(|| halves(dual, limits))
     };
-    pieces(mesh, chart, cut, settings, host).map(Some)
+    pieces(mesh, chart, cut, settings, monitor).map(Some)
 }
 
 /// Cuts `chart`, a part of `mesh`, between two of its vertices, given by their places in the chart, into at least two
@@ -58,10 +58,10 @@ pub fn separate(
     chart: &Chart,
     ends: [VertexId; 2],
     settings: &Settings,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<Chart>, Error> {
     let cut = |dual: &Dual, limits: &Limits| bisected(dual, Cells { of: nearer_end(dual, ends), count: 2 }, limits);
-    pieces(mesh, chart, cut, settings, host)
+    pieces(mesh, chart, cut, settings, monitor)
 }
 
 /// Cuts `chart`, a part of `mesh`, into at least two charts with the same id, between the triangles on one side and
@@ -74,11 +74,11 @@ pub fn halve(
     chart: &Chart,
     is_left: &[bool],
     settings: &Settings,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<Chart>, Error> {
     let cut =
         |dual: &Dual, limits: &Limits| bisected(dual, Cells { of: largest_parts(dual, is_left), count: 2 }, limits);
-    pieces(mesh, chart, cut, settings, host)
+    pieces(mesh, chart, cut, settings, monitor)
 }
 
 /// Per triangle 0 or 1, the side of the largest connected part of one side that is the fewest triangles away.
@@ -114,16 +114,16 @@ fn pieces(
     chart: &Chart,
     cut: impl FnOnce(&Dual, &Limits) -> Vec<u32>,
     settings: &Settings,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<Chart>, Error> {
     let part = mesh.part(chart);
-    let (dual, _) = with_features(&part, settings, host)?;
+    let (dual, _) = with_features(&part, settings, monitor)?;
     let limits = Limits::new(settings);
     let labels = cut(&dual, &limits);
     let (cells, _) = cells(&dual, &limits)?;
     let size = dual.total_area() / cells.count as f64;
     let pieces = finish(&dual, labels, limits, settings, &cells, |_| size.sqrt())?;
-    dual.pace.end()?;
+    dual.checkpoint.end()?;
     let on_surface = |piece: &Chart| Chart {
         id: chart.id,
         vertices: piece.vertices.iter().map(|v| chart.vertices[v.index()]).collect(),
@@ -180,7 +180,7 @@ fn bisected(dual: &Dual, cells: Cells, limits: &Limits) -> Vec<u32> {
 /// Per cell, whether it may be a chart. A safe point: all may be where nobody waits for charts any more.
 pub(super) fn legal(dual: &Dual, complex: &Complex, limits: &Limits) -> Vec<bool> {
     let count = complex.cells.len();
-    if dual.visited_all().is_err() {
+    if dual.checkpoint().is_err() {
         return vec![true; count];
     }
     let mut regions = Regions::new(complex, (0..count as u32).collect(), count);

@@ -312,7 +312,7 @@ fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Vec<bool> {
         if -distance < left[node as usize] {
             continue;
         }
-        if !dual.pace.goes_on(1) {
+        if !dual.checkpoint.goes_on(1) {
             break;
         }
         network.each_out(node as usize, |h| {

@@ -1,6 +1,6 @@
 use super::*;
 use crate::mesh::TriangleSoup;
-use crate::monitor::Alone;
+use crate::monitor::NoMonitor;
 use crate::topology::VertexId;
 use crate::{Order, finish_chart, finish_or_split, map_or_split, repair, shapes};
 
@@ -14,7 +14,7 @@ fn smooth() -> Settings {
 
 fn atlas(soup: &TriangleSoup, settings: &Settings) -> Atlas {
     let mesh = surface(soup);
-    let atlas = decompose(&mesh, settings, &Alone).expect("an atlas");
+    let atlas = decompose(&mesh, settings, &NoMonitor).expect("an atlas");
     let mut faces: Vec<_> = atlas.charts().iter().flat_map(|c| c.faces().iter().copied()).collect();
     faces.sort_unstable();
     assert_eq!(
@@ -126,11 +126,12 @@ fn what_stretches_too_much_is_split_until_it_does_not() {
         let settings = Settings { max_area_ratio, ..smooth() };
         let whole = assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk");
         let chart = whole.into_charts().remove(0);
-        let parts = map_or_split(&mesh, chart, Order::Quadratic, &settings, &Alone).expect("maps");
+        let parts = map_or_split(&mesh, chart, Order::Quadratic, &settings, &NoMonitor).expect("maps");
         assert!(parts.len() > 2, "{}", parts.len());
         assert_eq!(parts.iter().map(|(c, _)| c.triangles().len()).sum::<usize>(), mesh.triangles().len());
-        let finish =
-            |(chart, mapped)| finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings, &Alone).expect("maps");
+        let finish = |(chart, mapped)| {
+            finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings, &NoMonitor).expect("maps")
+        };
         for (chart, done) in parts.into_iter().flat_map(finish) {
             let ratio = crate::measure::distortion::area_ratio(&chart, &done.certified);
             assert!(ratio <= max_area_ratio, "{ratio} > {max_area_ratio}");
@@ -143,7 +144,7 @@ fn prediction_agrees_with_the_map_within_a_decade() {
     // Fingers are tubes: e^(4 L/D).
     for length in [1, 2, 3] {
         let mesh = surface(&shapes::finger(16, length));
-        let dual = Dual::new(&mesh, &Alone);
+        let dual = Dual::new(&mesh, &NoMonitor);
         let limits = Limits::new(&smooth());
         let (cells, _) = cells(&dual, &limits).expect("nobody cancels");
         let network = network::Network::new(&dual, vec![0; mesh.triangles().len()], limits);
@@ -194,7 +195,7 @@ fn seam_length(mesh: &SurfaceMesh, atlas: &Atlas) -> f64 {
 fn a_long_tube_is_cut_along_straight_lines() {
     // As one chart its area ratio would be e^40. Two strips have two seams, as long as the tube.
     let mesh = surface(&tube(24, 10));
-    let atlas = decompose(&mesh, &smooth(), &Alone).expect("an atlas");
+    let atlas = decompose(&mesh, &smooth(), &NoMonitor).expect("an atlas");
     assert_eq!(atlas.charts().len(), 2);
     let length = seam_length(&mesh, &atlas);
     assert!((39.9..1.05 * 40.0).contains(&length), "{length}");
@@ -204,7 +205,7 @@ fn a_long_tube_is_cut_along_straight_lines() {
 fn fingers_are_pulled_straight() {
     // Two combs that reach into each other in a disk of diameter 2.
     let mesh = surface(&shapes::flat_disk(40));
-    let dual = Dual::new(&mesh, &Alone);
+    let dual = Dual::new(&mesh, &NoMonitor);
     let limits = Limits::new(&smooth());
     let (cells, _) = cells(&dual, &limits).expect("nobody cancels");
     let place = |f: usize| dual.centroid(f).map(|x| x / mesh.metric().scale);
@@ -258,7 +259,7 @@ fn figure_eight(around: u32, length: u32) -> TriangleSoup {
 fn no_chart_meets_itself_where_sheets_were_taken_apart() {
     let mesh = surface(&figure_eight(24, 12));
     assert_eq!(mesh.census().nonmanifold_edges, 12);
-    let atlas = decompose(&mesh, &smooth(), &Alone).expect("an atlas");
+    let atlas = decompose(&mesh, &smooth(), &NoMonitor).expect("an atlas");
     assert!(atlas.charts().len() <= 4, "{}", atlas.charts().len());
     for chart in atlas.charts() {
         let welded = |v: VertexId| mesh.welded_vertex(chart.vertices()[v.index()]);

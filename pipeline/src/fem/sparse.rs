@@ -5,7 +5,7 @@
 //! several times the work). Unknowns are eliminated in an order of minimum degree (AMD: Amestoy, Davis and Duff 1996,
 //! doi 10.1137/S0895479894278952), or as they are numbered. General systems are solved by LU.
 
-use crate::monitor::{Cancelled, Host, Reserved};
+use crate::monitor::{Interrupted, Monitor, Reserved};
 use crate::topology::csr::Buckets;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
@@ -47,7 +47,7 @@ pub enum Error {
     },
     /// The solution was not wanted any more.
     #[error(transparent)]
-    Cancelled(#[from] Cancelled),
+    Interrupted(#[from] Interrupted),
 }
 
 /// The pattern of a symmetric matrix that is the sum of dense element matrices, and where each entry of each
@@ -174,17 +174,17 @@ impl Analysis<'_> {
     ///
     /// # Errors
     /// [`Error::Singular`] when a pivot is not positive, [`Error::TooLarge`] when memory is short,
-    /// [`Error::Cancelled`].
-    pub fn factorise<'a>(&'a self, values: &[f64], host: &'a dyn Host) -> Result<Factor<'a>, Error> {
-        if self.factor_entries() > SMALL && !host.go_on() {
-            return Err(Cancelled.into());
+    /// [`Error::Interrupted`].
+    pub fn factorise<'a>(&'a self, values: &[f64], monitor: &'a dyn Monitor) -> Result<Factor<'a>, Error> {
+        if self.factor_entries() > SMALL && !monitor.should_continue() {
+            return Err(Interrupted.into());
         }
         let unknowns = self.pattern.unknowns;
         let too_large = Error::TooLarge { unknowns };
         let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
         let bytes = size_of::<f64>() * self.factor_entries() + scratch.unaligned_bytes_required();
         // Before what it stands for, and so dropped after that.
-        let reserved = Reserved::new(host, bytes as u64);
+        let reserved = Reserved::new(monitor, bytes as u64);
         let mut factor = Vec::new();
         factor.try_reserve_exact(self.symbolic.len_val()).map_err(|_| too_large.clone())?;
         factor.resize(self.symbolic.len_val(), 0.0);
@@ -229,10 +229,10 @@ pub fn solve_general(
     entries: &[(u32, u32, f64)],
     rhs: &mut [f64],
     columns: usize,
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<(), Error> {
     let bytes = GROWTH * entries.len() * (size_of::<u32>() + size_of::<f64>());
-    let _reserved = Reserved::new(host, bytes as u64);
+    let _reserved = Reserved::new(monitor, bytes as u64);
     let triplets: Vec<_> = entries.iter().map(|(r, c, v)| Triplet::new(*r, *c, *v)).collect();
     let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(unknowns, unknowns, &triplets)
         .map_err(|_| Error::TooLarge { unknowns })?;
@@ -245,7 +245,7 @@ pub fn solve_general(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::monitor::Alone;
+    use crate::monitor::NoMonitor;
 
     /// A chain of springs between unknowns 0..n, the first one fastened.
     fn chain(n: u32) -> (Vec<[u32; 2]>, [[f64; 2]; 2]) {
@@ -260,7 +260,7 @@ mod tests {
         let mut values = pattern.zeros();
         (0..elements.len()).for_each(|e| pattern.add(&mut values, e, &matrix));
         let analysis = pattern.analyse().expect("small");
-        let factor = analysis.factorise(&values, &Alone).expect("positive definite");
+        let factor = analysis.factorise(&values, &NoMonitor).expect("positive definite");
         let mut pull = vec![0.0; 100];
         pull[49] = 1.0;
         pull[99] = 2.0;
@@ -277,16 +277,16 @@ mod tests {
         let mut values = pattern.zeros();
         pattern.add(&mut values, 0, &[[1.0, -1.0], [-1.0, 1.0]]);
         let analysis = pattern.analyse().expect("small");
-        assert_eq!(analysis.factorise(&values, &Alone).err(), Some(Error::Singular { unknowns: 2 }));
+        assert_eq!(analysis.factorise(&values, &NoMonitor).err(), Some(Error::Singular { unknowns: 2 }));
     }
 
     #[test]
     fn a_general_system_is_solved() {
         let entries = [(0, 0, 2.0), (0, 1, 1.0), (1, 0, -1.0), (1, 1, 3.0)];
         let mut rhs = [5.0, 8.0];
-        solve_general(2, &entries, &mut rhs, 1, &Alone).expect("regular");
+        solve_general(2, &entries, &mut rhs, 1, &NoMonitor).expect("regular");
         assert!((rhs[0] - 1.0).abs() < 1e-14 && (rhs[1] - 3.0).abs() < 1e-14);
         let singular = [(0, 0, 1.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 1.0)];
-        assert!(solve_general(2, &singular, &mut [1.0, 2.0], 1, &Alone).is_err());
+        assert!(solve_general(2, &singular, &mut [1.0, 2.0], 1, &NoMonitor).is_err());
     }
 }

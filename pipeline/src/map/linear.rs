@@ -15,7 +15,7 @@ use crate::grid::{GridPoint, orientation};
 use crate::map::boundary::Boundary;
 use crate::map::closed::ClosedChart;
 use crate::map::weights;
-use crate::monitor::Host;
+use crate::monitor::Monitor;
 use crate::topology::{EdgeId, FaceId, HalfEdgeId};
 
 /// After this many rounds of local changes, all negative edges are changed at once.
@@ -103,10 +103,10 @@ impl LinearMap {
 ///
 /// # Errors
 /// [`Error::Folded`] when the chart must be split; [`Error::Solver`].
-pub fn linear_map(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) -> Result<LinearMap, Error> {
+pub fn linear_map(chart: &ClosedChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<LinearMap, Error> {
     let unknowns = Unknowns::new(chart, boundary);
     let pattern = unknowns.pattern(chart);
-    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, host };
+    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, monitor };
     let harmonic = weights::harmonic(chart);
     let (places, mut folds) = attempt(&system, &harmonic)?;
     let count = folds.len();
@@ -129,7 +129,7 @@ pub fn linear_map(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) -> 
             return Ok(LinearMap { places, folded: count, edges_changed, method: Method::MMatrix });
         }
     }
-    let map = mean_value_map(chart, boundary, host)?;
+    let map = mean_value_map(chart, boundary, monitor)?;
     Ok(LinearMap { folded: count, ..map })
 }
 
@@ -152,8 +152,8 @@ fn attempt(system: &System, weights: &[f64]) -> Result<(Vec<GridPoint>, Vec<Face
 ///
 /// # Errors
 /// As [`linear_map`].
-pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) -> Result<LinearMap, Error> {
-    let places = solve_mean_value(chart, boundary, &weights::mean_value(chart), host)?;
+pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<LinearMap, Error> {
+    let places = solve_mean_value(chart, boundary, &weights::mean_value(chart), monitor)?;
     let folds = folded(chart, &places);
     match folds.first() {
         Some(first) => Err(Error::Folded { folded: folds.len(), first: *first }),
@@ -165,10 +165,14 @@ pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host)
 ///
 /// # Errors
 /// [`Error::Solver`].
-pub fn harmonic_places(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) -> Result<Vec<GridPoint>, Error> {
+pub fn harmonic_places(
+    chart: &ClosedChart,
+    boundary: &Boundary,
+    monitor: &dyn Monitor,
+) -> Result<Vec<GridPoint>, Error> {
     let unknowns = Unknowns::new(chart, boundary);
     let pattern = unknowns.pattern(chart);
-    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, host };
+    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, monitor };
     Ok(system.solve(&weights::harmonic(chart))?)
 }
 
@@ -241,12 +245,12 @@ struct System<'a> {
     chart: &'a ClosedChart,
     unknowns: &'a Unknowns,
     analysis: Analysis<'a>,
-    host: &'a dyn Host,
+    monitor: &'a dyn Monitor,
 }
 
 impl System<'_> {
     fn solve(&self, weights: &[f64]) -> Result<Vec<GridPoint>, sparse::Error> {
-        let Self { chart, unknowns, analysis, host } = self;
+        let Self { chart, unknowns, analysis, monitor } = self;
         let mut values = analysis.pattern().zeros();
         let mut rhs = vec![0.0; 2 * unknowns.count];
         for (e, w) in weights.iter().enumerate() {
@@ -256,7 +260,7 @@ impl System<'_> {
             unknowns.pull(&mut rhs, unknowns.number[b], a, *w);
         }
         if unknowns.count > 0 {
-            analysis.factorise(&values, *host)?.solve(&mut rhs, 2);
+            analysis.factorise(&values, *monitor)?.solve(&mut rhs, 2);
         }
         Ok(unknowns.places(&rhs))
     }
@@ -272,7 +276,7 @@ fn solve_mean_value(
     chart: &ClosedChart,
     boundary: &Boundary,
     weights: &[[f64; 2]],
-    host: &dyn Host,
+    monitor: &dyn Monitor,
 ) -> Result<Vec<GridPoint>, Error> {
     let unknowns = Unknowns::new(chart, boundary);
     let mut entries = Vec::new();
@@ -293,7 +297,7 @@ fn solve_mean_value(
     }
     entries.extend(row_sums.iter().enumerate().map(|(i, s)| (i as u32, i as u32, *s)));
     if unknowns.count > 0 {
-        sparse::solve_general(unknowns.count, &entries, &mut rhs, 2, host)?;
+        sparse::solve_general(unknowns.count, &entries, &mut rhs, 2, monitor)?;
     }
     Ok(unknowns.places(&rhs))
 }
@@ -332,7 +336,7 @@ mod tests {
     use crate::fem::bernstein;
     use crate::map::boundary::Mids;
     use crate::mesh::TriangleSoup;
-    use crate::monitor::Alone;
+    use crate::monitor::NoMonitor;
     use crate::{decompose, repair, shapes};
 
     fn closed(soup: &TriangleSoup) -> ClosedChart {
@@ -360,11 +364,11 @@ mod tests {
         for (i, soup) in shapes.iter().enumerate() {
             let chart = closed(soup);
             let mut boundary = Boundary::circle(&chart, Mids::Arc);
-            let linear = linear_map(&chart, &boundary, &Alone).expect("maps");
+            let linear = linear_map(&chart, &boundary, &NoMonitor).expect("maps");
             assert!(folded(&chart, linear.places()).is_empty());
             lower_ears(&chart, &linear, &mut boundary);
             assert!(valid(&chart, &linear.raised(&chart, &boundary)), "shape {i}");
-            let mean_value = mean_value_map(&chart, &boundary, &Alone).expect("maps");
+            let mean_value = mean_value_map(&chart, &boundary, &NoMonitor).expect("maps");
             assert!(folded(&chart, mean_value.places()).is_empty());
         }
     }
@@ -374,8 +378,8 @@ mod tests {
         for soup in [shapes::folding_three(), shapes::folding_six()] {
             let chart = closed(&soup);
             let boundary = Boundary::circle(&chart, Mids::Arc);
-            assert_eq!(folded(&chart, &harmonic_places(&chart, &boundary, &Alone).expect("solves")).len(), 1);
-            let map = linear_map(&chart, &boundary, &Alone).expect("maps");
+            assert_eq!(folded(&chart, &harmonic_places(&chart, &boundary, &NoMonitor).expect("solves")).len(), 1);
+            let map = linear_map(&chart, &boundary, &NoMonitor).expect("maps");
             assert_eq!((map.folded(), map.method()), (1, Method::MMatrix));
             assert!(map.edges_changed() > 0);
         }
@@ -385,7 +389,7 @@ mod tests {
     fn a_map_beyond_double_precision_is_refused() {
         let chart = closed(&shapes::finger(12, 22));
         let boundary = Boundary::circle(&chart, Mids::Arc);
-        let refused = linear_map(&chart, &boundary, &Alone);
+        let refused = linear_map(&chart, &boundary, &NoMonitor);
         assert!(matches!(refused, Err(Error::Folded { .. })), "area ratio e^88: {refused:?}");
     }
 }

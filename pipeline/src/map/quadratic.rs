@@ -13,7 +13,7 @@ use crate::fem::sparse::{self, PRESCRIBED, Pattern};
 use crate::grid::GridPoint;
 use crate::map::boundary::Boundary;
 use crate::map::closed::ClosedChart;
-use crate::monitor::{Host, Pace};
+use crate::monitor::{Checkpoint, Monitor};
 use crate::topology::FaceId;
 
 /// The harmonic map by quadratic elements, valid or not.
@@ -52,8 +52,12 @@ impl QuadraticMap {
 ///
 /// # Errors
 /// [`sparse::Error`] when the system cannot be factorised.
-pub fn quadratic_map(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) -> Result<QuadraticMap, sparse::Error> {
-    let pace = Pace::new(host);
+pub fn quadratic_map(
+    chart: &ClosedChart,
+    boundary: &Boundary,
+    monitor: &dyn Monitor,
+) -> Result<QuadraticMap, sparse::Error> {
+    let checkpoint = Checkpoint::new(monitor);
     let mut number = vec![0_u32; chart.node_count()];
     let mut uv = vec![[0.0; 2]; chart.node_count()];
     for (i, h) in chart.outer().iter().enumerate() {
@@ -70,12 +74,12 @@ pub fn quadratic_map(chart: &ClosedChart, boundary: &Boundary, host: &dyn Host) 
             unknowns += 1;
         }
     }
-    let solution = solve(chart, &number, &uv, unknowns as usize, &pace)?;
+    let solution = solve(chart, &number, &uv, unknowns as usize, &checkpoint)?;
     for (node, n) in number.iter().enumerate().filter(|(_, n)| **n != PRESCRIBED) {
         uv[node] = [solution[*n as usize], solution[(unknowns + n) as usize]];
     }
     let nodes = to_grid(chart, &uv);
-    pace.after(chart.triangles().len())?;
+    checkpoint.after(chart.triangles().len())?;
     let invalid = invalid_triangles(chart, &nodes);
     // Of the solution itself: the grid ends not far outside the disk, and what was cut off there is no lower bound.
     let energy = energy_of(chart, &uv);
@@ -88,11 +92,11 @@ fn solve(
     number: &[u32],
     uv: &[[f64; 2]],
     unknowns: usize,
-    pace: &Pace,
+    checkpoint: &Checkpoint,
 ) -> Result<Vec<f64>, sparse::Error> {
     let faces = 0..chart.triangles().len();
     let elements: Vec<[u32; 6]> = faces.clone().map(|f| chart.nodes(f).map(|n| number[n])).collect();
-    pace.after(elements.len())?;
+    checkpoint.after(elements.len())?;
     let pattern = Pattern::new(unknowns, &elements);
     let mut values = pattern.zeros();
     let mut rhs = vec![0.0; 2 * unknowns];
@@ -108,8 +112,8 @@ fn solve(
         }
     }
     if unknowns > 0 {
-        pace.after(elements.len())?;
-        pattern.analyse_as_numbered()?.factorise(&values, pace.host)?.solve(&mut rhs, 2);
+        checkpoint.after(elements.len())?;
+        pattern.analyse_as_numbered()?.factorise(&values, checkpoint.monitor)?.solve(&mut rhs, 2);
     }
     Ok(rhs)
 }
@@ -168,7 +172,7 @@ mod tests {
     use super::*;
     use crate::map::boundary::Mids;
     use crate::map::linear;
-    use crate::monitor::Alone;
+    use crate::monitor::NoMonitor;
     use crate::{decompose, repair, shapes};
 
     #[test]
@@ -178,8 +182,8 @@ mod tests {
             &decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0],
         );
         let boundary = Boundary::circle(&chart, Mids::Arc);
-        let start = linear::linear_map(&chart, &boundary, &Alone).expect("maps").raised(&chart, &boundary);
-        let map = quadratic_map(&chart, &boundary, &Alone).expect("solves");
+        let start = linear::linear_map(&chart, &boundary, &NoMonitor).expect("maps").raised(&chart, &boundary);
+        let map = quadratic_map(&chart, &boundary, &NoMonitor).expect("solves");
         assert!(map.energy() < energy(&chart, &start));
         // Moving any node raises the energy: the map is the minimiser.
         for node in [20, chart.own_vertices() + 100, chart.own_nodes(), chart.node_count() - 1] {
@@ -196,7 +200,7 @@ mod tests {
             &decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0],
         );
         let boundary = Boundary::circle(&chart, Mids::Chord);
-        let map = quadratic_map(&chart, &boundary, &Alone).expect("solves");
+        let map = quadratic_map(&chart, &boundary, &NoMonitor).expect("solves");
         assert!(map.invalid().is_empty());
         // The start of the loop may be turned: distances from the centre are kept.
         for (v, p) in mesh.points().iter().enumerate() {

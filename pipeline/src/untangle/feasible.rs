@@ -8,7 +8,7 @@ use crate::fem::sparse::Error;
 use crate::grid::GridPoint;
 use crate::map::closed::ClosedChart;
 use crate::map::quadratic::energies;
-use crate::monitor::Pace;
+use crate::monitor::Checkpoint;
 
 /// The weights of the barrier, relative to the energy of each triangle.
 const WEIGHTS: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
@@ -28,14 +28,14 @@ pub(super) fn untangle(
     chart: &ClosedChart,
     start: &[GridPoint],
     effort: &mut Effort,
-    pace: &Pace,
+    checkpoint: &Checkpoint,
 ) -> Option<Vec<GridPoint>> {
-    pace.after(chart.triangles().len()).ok()?;
+    checkpoint.after(chart.triangles().len()).ok()?;
     let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
     let mut all = places(start, &centres);
     let energies: Vec<f64> = energies(chart, &all).collect();
     let mean = energies.iter().sum::<f64>() / chart.own_triangles() as f64;
-    let mut problem = problem(chart, &energies, mean, pace);
+    let mut problem = problem(chart, &energies, mean, checkpoint);
     let mut x = problem.gather(&all);
     problem
         .for_each_bound(&x, |c, bound| *bound = Bound { scale: c, floor: KEPT * c, weight: bound.weight, dual: None });
@@ -50,14 +50,14 @@ fn unset(weight: f64) -> Bound {
 
 /// All triangles, with weights proportional to their energies but bounds still unset; every node may move but those
 /// of the outer loop.
-fn problem<'a>(chart: &'a ClosedChart, energies: &[f64], mean: f64, pace: &'a Pace) -> Problem<'a> {
+fn problem<'a>(chart: &'a ClosedChart, energies: &[f64], mean: f64, checkpoint: &'a Checkpoint) -> Problem<'a> {
     let own = chart.own_triangles() as u32;
     let bounds = |face: u32| (face < own).then(|| [unset(energies[face as usize].max(1e-6 * mean)); 6]);
     let cells = (0..chart.triangles().len() as u32).map(|face| Cell { face, bounds: bounds(face) }).collect();
     let fixed = region::fixed_nodes(chart);
     let centres = chart.node_count()..chart.node_count() + chart.loops().len();
     let free: Vec<u32> = (0..fixed.len()).filter(|n| !fixed[*n]).chain(centres).map(|n| n as u32).collect();
-    Problem::new(chart, cells, region::arc_cells(chart, |_| true, unset(mean)), &free, pace)
+    Problem::new(chart, cells, region::arc_cells(chart, |_| true, unset(mean)), &free, checkpoint)
 }
 
 /// Minimises with falling weights.
@@ -66,7 +66,7 @@ fn descend(problem: &mut Problem, x: &mut super::Places, effort: &mut Effort) ->
         return Ok(());
     }
     let pattern = problem.pattern();
-    problem.visited_all()?;
+    problem.checkpoint()?;
     let analysis = pattern.analyse()?;
     let steps = (WORK / problem.cells.len()).clamp(STEPS[0], STEPS[1]);
     let mut last = 1.0;

@@ -30,7 +30,7 @@ use crate::certify::{Arc, star_centre};
 use crate::grid::GridPoint;
 use crate::map::closed::ClosedChart;
 use crate::map::quadratic::{self, QuadraticMap, energy, invalid_triangles};
-use crate::monitor::{Host, Pace};
+use crate::monitor::{Checkpoint, Monitor};
 use problem::Places;
 
 /// Above this share of invalid triangles the feasible path is taken at once.
@@ -108,9 +108,9 @@ impl Effort {
 
 /// Untangles the harmonic map of `chart`; `start` is the valid raised linear map with the same boundary, and the result
 /// where nobody waits for a better one any more.
-pub fn untangle(chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap, host: &dyn Host) -> Untangled {
+pub fn untangle(chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap, monitor: &dyn Monitor) -> Untangled {
     let mut effort = Effort::default();
-    let (method, nodes, hole_centres) = best(chart, start, harmonic, &mut effort, &Pace::new(host));
+    let (method, nodes, hole_centres) = best(chart, start, harmonic, &mut effort, &Checkpoint::new(monitor));
     let report = Report {
         method,
         iterations: effort.iterations,
@@ -129,19 +129,19 @@ fn best(
     start: &[GridPoint],
     harmonic: &QuadraticMap,
     effort: &mut Effort,
-    pace: &Pace,
+    checkpoint: &Checkpoint,
 ) -> (Method, Vec<GridPoint>, Vec<GridPoint>) {
     if let Some(centres) = valid(chart, harmonic.nodes()) {
         return (Method::Harmonic, harmonic.nodes().to_vec(), centres);
     }
     if harmonic.invalid().len() as f64 <= FEW * chart.own_triangles() as f64 {
-        let nodes = patch::untangle(chart, start, harmonic, effort, pace);
+        let nodes = patch::untangle(chart, start, harmonic, effort, checkpoint);
         if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
             return (Method::Patch, nodes.unwrap_or_default(), centres);
         }
     }
     effort.decrement = 0.0;
-    let nodes = feasible::untangle(chart, start, effort, pace);
+    let nodes = feasible::untangle(chart, start, effort, checkpoint);
     if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
         return (Method::Feasible, nodes.unwrap_or_default(), centres);
     }

@@ -33,7 +33,7 @@ pub(super) fn minimise(
     let mut objective = problem.objective(x, penalty);
     let mut outcome = Outcome { iterations: 0, decrement: 0.0 };
     while outcome.iterations < most {
-        problem.visited_all()?;
+        problem.checkpoint()?;
         let mut model = problem.model(x, penalty, pattern);
         let step = newton_step(problem, (pattern, analysis), &mut model)?;
         let slope: f64 = step.iter().zip(&model.gradient).map(|(s, g)| s * g).sum();
@@ -69,7 +69,7 @@ fn search(
     };
     let start: Vec<[f64; 2]> = problem.free.iter().map(|n| x[*n as usize]).collect();
     let mut t = limit.min(1.0);
-    for _ in (0..HALVINGS).take_while(|_| problem.visited_all().is_ok()) {
+    for _ in (0..HALVINGS).take_while(|_| problem.checkpoint().is_ok()) {
         for (p, n) in start.iter().zip(&problem.free) {
             let d = direction[*n as usize];
             x[*n as usize] = [p[0] + t * d[0], p[1] + t * d[1]];

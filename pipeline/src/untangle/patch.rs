@@ -13,7 +13,7 @@ use crate::fem::bernstein::{ExactDet, Validity};
 use crate::grid::GridPoint;
 use crate::map::closed::ClosedChart;
 use crate::map::quadratic::{QuadraticMap, det, invalid_triangles, node_to_grid};
-use crate::monitor::Pace;
+use crate::monitor::Checkpoint;
 use crate::topology::Stars;
 use crate::topology::{HalfEdgeId, VertexId};
 
@@ -46,13 +46,13 @@ pub(super) fn untangle(
     start: &[GridPoint],
     harmonic: &QuadraticMap,
     effort: &mut Effort,
-    pace: &Pace,
+    checkpoint: &Checkpoint,
 ) -> Option<Vec<GridPoint>> {
-    let setting = Setting::new(chart, start, pace);
+    let setting = Setting::new(chart, start, checkpoint);
     let mut nodes = harmonic.nodes().to_vec();
     let mut x = harmonic.places().to_vec();
     for rings in RINGS {
-        pace.after(chart.triangles().len()).ok()?;
+        checkpoint.after(chart.triangles().len()).ok()?;
         let centres: Vec<_> = (0..chart.loops().len()).map(|k| centre_of_hole(chart, &nodes, k)).collect();
         let seeds = seeds(chart, &nodes, &centres);
         if seeds.is_empty() {
@@ -66,7 +66,7 @@ pub(super) fn untangle(
             return None;
         }
         for faces in &patches.parts {
-            pace.after(faces.len()).ok()?;
+            checkpoint.after(faces.len()).ok()?;
             let weight = |v: usize| 1.5 * (1.0 - f64::from(patches.distance[v]) / rings as f64);
             for (n, p) in setting.solve(faces, &x, weight, effort).unwrap_or_default() {
                 x[n] = p;
@@ -100,11 +100,11 @@ struct Setting<'a> {
     start: Places,
     /// Per node, whether it lies on the outer loop.
     fixed: Vec<bool>,
-    pace: &'a Pace<'a>,
+    checkpoint: &'a Checkpoint<'a>,
 }
 
 impl<'a> Setting<'a> {
-    fn new(chart: &'a ClosedChart, start: &[GridPoint], pace: &'a Pace) -> Self {
+    fn new(chart: &'a ClosedChart, start: &[GridPoint], checkpoint: &'a Checkpoint) -> Self {
         let stars = Stars::new(chart.triangles(), chart.vertex_count());
         let in_plane = |f: usize| det(chart, start, f).coefficients().iter().sum::<f64>() / 6.0;
         let plane: Vec<f64> = (0..chart.triangles().len()).map(in_plane).collect();
@@ -116,7 +116,7 @@ impl<'a> Setting<'a> {
         };
         let density = (0..plane.len()).map(density).collect();
         let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-        Self { chart, stars, density, start: places(start, &centres), fixed: region::fixed_nodes(chart), pace }
+        Self { chart, stars, density, start: places(start, &centres), fixed: region::fixed_nodes(chart), checkpoint }
     }
 
     /// Untangles one patch of the map `x` (all nodes and star centres), begun between `x` and the feasible start by
@@ -188,7 +188,7 @@ impl<'a> Setting<'a> {
             let scale = terms::arc_products(&arc.nodes.map(|n| self.start[n as usize]));
             (0..3).for_each(|k| arc.bounds[k].scale = scale[k]);
         }
-        Problem::new(self.chart, cells, arcs, &free, self.pace)
+        Problem::new(self.chart, cells, arcs, &free, self.checkpoint)
     }
 }
 
@@ -196,7 +196,7 @@ impl<'a> Setting<'a> {
 /// or its systems cannot be solved.
 fn relax(problem: &mut Problem, x: &mut Places, effort: &mut Effort) -> Option<()> {
     let pattern = problem.pattern();
-    problem.visited_all().ok()?;
+    problem.checkpoint().ok()?;
     let analysis = pattern.analyse().ok()?;
     problem.scale_weights(PULL);
     let mut least = problem.least(x);

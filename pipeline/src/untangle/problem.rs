@@ -6,7 +6,7 @@ use crate::fem::element;
 use crate::fem::jacobian::{Corners, Six};
 use crate::fem::sparse::{Analysis, Error, PRESCRIBED, Pattern};
 use crate::map::closed::ClosedChart;
-use crate::monitor::{Cancelled, Pace};
+use crate::monitor::{Checkpoint, Interrupted};
 
 /// The work of a triangle: as long as so many are looked at elsewhere.
 const WORK_PER_CELL: usize = 4;
@@ -30,7 +30,7 @@ pub(super) struct ArcCell {
 /// own, so that a small region costs little, however large the chart is.
 pub(super) struct Problem<'a> {
     chart: &'a ClosedChart,
-    pace: &'a Pace<'a>,
+    checkpoint: &'a Checkpoint<'a>,
     pub cells: Vec<Cell>,
     pub arcs: Vec<ArcCell>,
     /// The nodes of the region in the numbering of the chart (star centres after all others), ascending.
@@ -52,7 +52,13 @@ pub(super) struct Model {
 impl<'a> Problem<'a> {
     /// The problem on `cells` and `arcs`, of whose nodes those in `free` may move; nodes as numbered in the chart,
     /// star centres after all others.
-    pub fn new(chart: &'a ClosedChart, cells: Vec<Cell>, mut arcs: Vec<ArcCell>, free: &[u32], pace: &'a Pace) -> Self {
+    pub fn new(
+        chart: &'a ClosedChart,
+        cells: Vec<Cell>,
+        mut arcs: Vec<ArcCell>,
+        free: &[u32],
+        checkpoint: &'a Checkpoint,
+    ) -> Self {
         let six = |cell: &Cell| chart.nodes(cell.face as usize).map(|n| n as u32);
         let mut nodes: Vec<u32> = cells.iter().flat_map(six).chain(arcs.iter().flat_map(|a| a.nodes)).collect();
         nodes.sort_unstable();
@@ -63,12 +69,12 @@ impl<'a> Problem<'a> {
         let free: Vec<u32> = free.iter().map(|n| local(*n)).collect();
         let mut number = vec![PRESCRIBED; nodes.len()];
         free.iter().enumerate().for_each(|(i, n)| number[*n as usize] = i as u32);
-        Self { chart, pace, cells, arcs, nodes, of_cell, free, number }
+        Self { chart, checkpoint, cells, arcs, nodes, of_cell, free, number }
     }
 
     /// A safe point, after all triangles of the region were looked at.
-    pub fn visited_all(&self) -> Result<(), Cancelled> {
-        self.pace.after(WORK_PER_CELL * self.cells.len())
+    pub fn checkpoint(&self) -> Result<(), Interrupted> {
+        self.checkpoint.after(WORK_PER_CELL * self.cells.len())
     }
 
     /// The nodes of the region, as numbered in the chart, ascending.
@@ -285,7 +291,7 @@ pub(super) fn newton_step(
 ) -> Result<Vec<f64>, Error> {
     let mut shift = 1e-12;
     loop {
-        match analysis.factorise(&model.hessian, problem.pace.host) {
+        match analysis.factorise(&model.hessian, problem.checkpoint.monitor) {
             Ok(factor) => {
                 let mut step: Vec<f64> = model.gradient.iter().map(|g| -g).collect();
                 factor.solve(&mut step, 1);

@@ -3,7 +3,7 @@ use crate::map::boundary::{Boundary, Mids};
 use crate::map::linear::{linear_map, lower_ears};
 use crate::map::quadratic::quadratic_map;
 use crate::mesh::TriangleSoup;
-use crate::monitor::Alone;
+use crate::monitor::NoMonitor;
 use crate::{decompose, repair, shapes};
 
 /// A chart with its feasible start and its harmonic map.
@@ -12,9 +12,9 @@ fn prepared(soup: &TriangleSoup) -> (ClosedChart, Vec<GridPoint>, QuadraticMap) 
     let chart =
         ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
     let mut boundary = Boundary::circle(&chart, Mids::Arc);
-    let linear = linear_map(&chart, &boundary, &Alone).expect("maps");
+    let linear = linear_map(&chart, &boundary, &NoMonitor).expect("maps");
     lower_ears(&chart, &linear, &mut boundary);
-    let harmonic = quadratic_map(&chart, &boundary, &Alone).expect("solves");
+    let harmonic = quadratic_map(&chart, &boundary, &NoMonitor).expect("solves");
     let start = linear.raised(&chart, &boundary);
     (chart, start, harmonic)
 }
@@ -30,7 +30,7 @@ fn check(chart: &ClosedChart, untangled: &Untangled) {
 fn a_valid_harmonic_map_is_left_alone() {
     let (chart, start, harmonic) = prepared(&shapes::disk(8));
     assert!(harmonic.invalid().is_empty());
-    let got = untangle(&chart, &start, &harmonic, &Alone);
+    let got = untangle(&chart, &start, &harmonic, &NoMonitor);
     assert_eq!((got.report.method, got.report.nodes_moved), (Method::Harmonic, 0));
 }
 
@@ -39,7 +39,7 @@ fn the_small_examples_are_untangled() {
     for soup in [shapes::folding_three(), shapes::folding_six()] {
         let (chart, start, harmonic) = prepared(&soup);
         assert!(!harmonic.invalid().is_empty());
-        let got = untangle(&chart, &start, &harmonic, &Alone);
+        let got = untangle(&chart, &start, &harmonic, &NoMonitor);
         assert_eq!(got.report.method, Method::Feasible, "a third of the triangles is invalid");
         check(&chart, &got);
     }
@@ -49,11 +49,11 @@ fn the_small_examples_are_untangled() {
 fn a_bent_disk_is_untangled_close_to_the_harmonic_map_on_both_paths() {
     let (chart, start, harmonic) = prepared(&shapes::bent_disk(32, 0.45, 1.0));
     assert!(harmonic.invalid().len() > 150, "{} invalid", harmonic.invalid().len());
-    let got = untangle(&chart, &start, &harmonic, &Alone);
+    let got = untangle(&chart, &start, &harmonic, &NoMonitor);
     assert_eq!(got.report.method, Method::Patch);
     check(&chart, &got);
     let mut effort = Effort::default();
-    let nodes = feasible::untangle(&chart, &start, &mut effort, &Pace::new(&Alone)).expect("small");
+    let nodes = feasible::untangle(&chart, &start, &mut effort, &Checkpoint::new(&NoMonitor)).expect("small");
     assert!(valid(&chart, &nodes).is_some());
     // Patches alone come as close to the lower bound as the whole chart does.
     for energy in [got.report.energy, energy(&chart, &nodes)] {
@@ -66,5 +66,5 @@ fn the_harmonic_energy_is_a_lower_bound_even_where_the_map_leaves_the_disk_far_b
     let (chart, start, harmonic) = prepared(&shapes::bent_disk(8, 0.45, 10.0));
     let farthest = harmonic.places().iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
     assert!(farthest > 2.0, "beyond the grid: {farthest}");
-    check(&chart, &untangle(&chart, &start, &harmonic, &Alone));
+    check(&chart, &untangle(&chart, &start, &harmonic, &NoMonitor));
 }

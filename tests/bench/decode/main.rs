@@ -20,7 +20,7 @@ mod xml;
 
 use planish::formats::{self, Kind};
 use planish_core::mesh::TriangleSoup;
-use planish_core::monitor::Alone;
+use planish_core::monitor::NoMonitor;
 use rustix::time::{ClockId, clock_gettime};
 use std::error::Error;
 use std::path::Path;
@@ -152,7 +152,7 @@ fn measure(path: &Path, cut: bool) -> Result<(), Box<dyn Error>> {
     drop(soup);
     let mut whole = 0.0;
     if cut {
-        planish_core::decompose(&mesh, &Default::default(), &Alone)?;
+        planish_core::decompose(&mesh, &Default::default(), &NoMonitor)?;
         whole = peak()? - before;
     }
     drop(mesh);

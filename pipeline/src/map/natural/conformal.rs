@@ -9,13 +9,13 @@ use crate::atlas::Chart;
 use crate::certify::parts;
 use crate::fem::sparse::{self, PRESCRIBED, Pattern};
 use crate::mesh::TriangleShape;
-use crate::monitor::Host;
+use crate::monitor::Monitor;
 
 /// The least squares conformal map of `chart`; none where it is not one-to-one.
 ///
 /// # Errors
 /// The system cannot be solved.
-pub fn conformal(chart: &Chart, host: &dyn Host) -> Result<Option<Natural>, sparse::Error> {
+pub fn conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Option<Natural>, sparse::Error> {
     let held = far_apart(chart);
     let numbers = Numbers::new(chart.vertices().len() + chart.edges().len(), held);
     let nodes: Vec<[usize; 3]> = chart.cells().flat_map(similar).collect();
@@ -33,7 +33,7 @@ pub fn conformal(chart: &Chart, host: &dyn Host) -> Result<Option<Natural>, spar
             entries.for_each(|(row, entries)| rhs[*row as usize] -= entries[k]);
         }
     }
-    pattern.analyse()?.factorise(&values, host)?.solve(&mut rhs, 1);
+    pattern.analyse()?.factorise(&values, monitor)?.solve(&mut rhs, 1);
     Ok(certified(chart, &numbers.places(&rhs)))
 }
 

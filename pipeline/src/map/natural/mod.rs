@@ -19,7 +19,7 @@ use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
 use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, quantiles, singular_ratio};
 use crate::mesh::SurfaceMesh;
-use crate::monitor::Host;
+use crate::monitor::Monitor;
 pub use conformal::conformal;
 pub use projection::projection;
 
@@ -51,11 +51,11 @@ const EVEN: f64 = 100.0;
 
 /// A natural map that stretches `chart`, one of `mesh`, less than `on_disk`, the conformal distortion that its map on
 /// the disk does not exceed on 99 % of the area; none where there is none, or that is not found by reasonable means.
-pub fn natural(mesh: &SurfaceMesh, chart: &Chart, on_disk: f64, host: &dyn Host) -> Option<Natural> {
+pub fn natural(mesh: &SurfaceMesh, chart: &Chart, on_disk: f64, monitor: &dyn Monitor) -> Option<Natural> {
     let unrolled = || {
         let is_wanted = on_disk > UNEVEN && chart.triangles().len() <= UNROLLED;
         // Where the system cannot be solved, there is the map on the disk.
-        let found = is_wanted.then(|| conformal(chart, host).ok()).flatten().flatten();
+        let found = is_wanted.then(|| conformal(chart, monitor).ok()).flatten().flatten();
         found.filter(|n| n.distortion.conformal_p99 < on_disk)
     };
     let is_even = |n: &Natural| n.distortion.area_ratio < EVEN;
@@ -121,14 +121,14 @@ fn stretch(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::mesh::TriangleSoup;
-    use crate::monitor::Alone;
+    use crate::monitor::NoMonitor;
     use crate::vec3::Vec3;
     use crate::{decompose, repair, shapes};
 
     fn charts(soup: &TriangleSoup) -> (SurfaceMesh, Vec<Chart>) {
         let mesh = repair(soup, &Default::default()).expect("repairs").mesh;
         let no_features = decompose::Settings { feature_angle: None, ..Default::default() };
-        let atlas = decompose(&mesh, &no_features, &Alone).expect("decomposes");
+        let atlas = decompose(&mesh, &no_features, &NoMonitor).expect("decomposes");
         (mesh, atlas.into_charts())
     }
 
@@ -170,7 +170,7 @@ mod tests {
         let soup = TriangleSoup::new(points, quads.flat_map(halves).collect()).expect("sound");
         let (mesh, strip) = charts(&soup);
         assert!(projection(&mesh, &strip[0], f64::MAX).is_none(), "it turns back");
-        let unrolled = conformal(&strip[0], &Alone).expect("unrolled").expect("one-to-one").distortion;
+        let unrolled = conformal(&strip[0], &NoMonitor).expect("unrolled").expect("one-to-one").distortion;
         assert!((unrolled.conformal_p99 - 1.0).abs() < 1e-6 && unrolled.area_ratio < 1.0 + 1e-6, "{unrolled:?}");
     }
 
@@ -189,13 +189,13 @@ mod tests {
         let (mesh, ramp) = charts(&soup);
         assert_eq!(ramp.len(), 1);
         assert!(projection(&mesh, &ramp[0], f64::MAX).is_none());
-        assert!(conformal(&ramp[0], &Alone).expect("solved").is_none());
+        assert!(conformal(&ramp[0], &NoMonitor).expect("solved").is_none());
     }
 
     #[test]
     fn a_hemisphere_is_mapped_conformally() {
         let (_, halves) = charts(&shapes::sphere(12));
-        let of = conformal(&halves[0], &Alone).expect("solved").expect("one-to-one").distortion;
+        let of = conformal(&halves[0], &NoMonitor).expect("solved").expect("one-to-one").distortion;
         assert!(of.conformal_p99 < 1.6, "{of:?}");
     }
 }

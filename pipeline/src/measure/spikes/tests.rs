@@ -1,7 +1,7 @@
 use super::*;
 use crate::measure::curvature;
 use crate::mesh::TriangleSoup;
-use crate::monitor::Alone;
+use crate::monitor::NoMonitor;
 use crate::{decompose, repair};
 use std::f64::consts::{PI, TAU};
 
@@ -38,7 +38,7 @@ fn spiked_disk(degrees: f64, step: f64) -> TriangleSoup {
 fn found(soup: &TriangleSoup, size: f64) -> Vec<Spike> {
     let mesh = repair(soup, &Default::default()).expect("repairs").mesh;
     let no_features = decompose::Settings { feature_angle: None, ..Default::default() };
-    let atlas = decompose(&mesh, &no_features, &Alone).expect("decomposes");
+    let atlas = decompose(&mesh, &no_features, &NoMonitor).expect("decomposes");
     let group: Vec<u32> = (0..mesh.points().len() as u32).collect();
     let curvatures = curvature::measure(&mesh, &group, group.len());
     let curvatures: Vec<Principal> = curvatures.iter().map(|c| c.principal(mesh.metric().scale)).collect();
