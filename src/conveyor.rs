@@ -42,10 +42,9 @@ use board::Running;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use grants::{Grants, Own};
 use parking_lot::RwLock;
-use planish_core::MappedChart;
-use planish_core::atlas::Chart;
 use planish_core::mesh::TriangleSoup;
 use planish_core::monitor::Monitor;
+use planish_core::{CertifiedChart, ChartJob, MappedChart, Plan};
 use queue::Queue;
 use reading::Next;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -253,14 +252,14 @@ struct Soup {
 struct Cut {
     surface: Arc<Surface>,
     place: Place,
-    chart: Chart,
+    job: ChartJob,
 }
 
 /// What untangling gets.
 struct Mapped {
     surface: Arc<Surface>,
     place: Place,
-    mapped: (Chart, MappedChart),
+    mapped: MappedChart,
 }
 
 /// What writing gets.
@@ -284,21 +283,20 @@ fn hand_on<T>(to: &Sender<T>, item: T) {
 }
 
 fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
-    match travel.compute(Stage::Decompose, |monitor| stages::cut(soup, &travel.settings, &mut report, monitor)) {
+    match travel.compute(Stage::Decompose, |monitor| stages::plan(soup, &travel.settings, &mut report, monitor)) {
         Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
-        Ok((mesh, parts)) => {
-            let surface = Surface::new(travel, mesh, parts.len(), report);
-            for (i, chart) in parts.into_iter().enumerate() {
-                hand_on(charts, Cut { surface: surface.clone(), place: (i, 0), chart });
+        Ok(Plan { mesh, jobs, .. }) => {
+            let surface = Surface::new(travel, mesh, jobs.len(), report);
+            for (i, job) in jobs.into_iter().enumerate() {
+                hand_on(charts, Cut { surface: surface.clone(), place: (i, 0), job });
             }
         }
     }
 }
 
-fn map(Cut { surface, place, chart }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
-    let travel = &surface.travel;
-    let work = |monitor: &dyn Monitor| stages::map(&surface.mesh, chart, &travel.settings, monitor);
-    let parts = if surface.is_due(place) { travel.compute(Stage::Map, work) } else { Err(Stopped::Unwanted) };
+fn map(Cut { surface, place, job }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
+    let work = |monitor: &dyn Monitor| stages::map(job, monitor);
+    let parts = if surface.is_due(place) { surface.travel.compute(Stage::Map, work) } else { Err(Stopped::Unwanted) };
     match parts {
         Err(why) => deposit(surface, place, Err(why), finished),
         Ok(parts) => {
@@ -312,7 +310,7 @@ fn map(Cut { surface, place, chart }: Cut, untangle: &Sender<Mapped>, finished: 
 
 fn untangle(Mapped { surface, place, mapped }: Mapped, finished: &Sender<Finished>) {
     let travel = &surface.travel;
-    let work = |monitor: &dyn Monitor| stages::untangle(&surface.mesh, mapped, &travel.settings, monitor);
+    let work = |monitor: &dyn Monitor| stages::untangle(mapped, monitor);
     let part = if surface.is_due(place) { travel.compute(Stage::Untangle, work) } else { Err(Stopped::Unwanted) };
     deposit(surface, place, part, finished);
 }
@@ -320,7 +318,7 @@ fn untangle(Mapped { surface, place, mapped }: Mapped, finished: &Sender<Finishe
 fn deposit(
     surface: Arc<Surface>,
     place: Place,
-    part: Result<Vec<(Chart, planish_core::CertifiedChart)>, Stopped>,
+    part: Result<Vec<CertifiedChart>, Stopped>,
     finished: &Sender<Finished>,
 ) {
     if surface.deposit(place, part) {

@@ -10,16 +10,13 @@ use crate::regular::{self, OpenError};
 use crate::report::{self, Decomposition, Output, Report};
 use crate::settings::{self, Settings};
 use bytesize::ByteSize;
-use planish_core::atlas::{Atlas, Chart};
-use planish_core::decompose::{self, split_ears};
+use planish_core::atlas::Atlas;
 use planish_core::fem::sparse;
 use planish_core::map::linear;
-use planish_core::measure::distortion::{self, CellFields};
 use planish_core::mesh::{SurfaceMesh, TriangleSoup};
 use planish_core::monitor::{Monitor, NoMonitor};
-use planish_core::repair::Repaired;
-use planish_core::seams::SeamNetwork;
-use planish_core::{CertifiedChart, MapError, MappedChart, SplitError, finish_or_split, map_or_split, repair};
+use planish_core::repair::{self, Repaired, repair};
+use planish_core::{CertifiedAtlas, CertifiedChart, ChartError, ChartJob, MapError, MappedChart, Plan, decompose};
 use std::cell::RefCell;
 use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -221,7 +218,7 @@ impl Beside for Folder<'_> {
 /// # Errors
 /// The refusal, where nothing is left.
 pub fn repaired(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Reason> {
-    let found = repair(soup, &planish_core::repair::Settings { weld: settings.weld });
+    let found = repair(soup, &settings.core().repair);
     found.map_err(|e| not_repaired(&e))
 }
 
@@ -246,12 +243,12 @@ pub fn check_sheets(found: &Repaired) -> Result<(), Reason> {
 ///
 /// # Errors
 /// The refusal, or that the result is no longer wanted.
-pub fn cut(
+pub fn plan(
     soup: TriangleSoup,
     settings: &Settings,
     report: &mut Report,
     monitor: &dyn Monitor,
-) -> Result<(SurfaceMesh, Vec<Chart>), Stopped> {
+) -> Result<Plan, Stopped> {
     let found = repaired(&soup, settings)?;
     // The surface is all that is needed from here on.
     drop(soup);
@@ -260,17 +257,10 @@ pub fn cut(
     report.warnings = report::warnings(&found);
     report.warnings.iter().for_each(|w| tracing::warn!("{}", w.message));
     check_sheets(&found)?;
-    let atlas = planish_core::decompose(&found.mesh, &settings.decompose(), monitor).map_err(not_cut)?;
-    let feature_edges = atlas.feature_edges();
-    report.decomposition = Some(Decomposition { feature_edges, ..Decomposition::default() });
-    let without = split_ears(&found.mesh, &atlas, settings.decompose().max_triangles);
-    Ok(match without.map_err(internal)? {
-        Some(done) => {
-            report.decomposition.iter_mut().for_each(|d| d.ears_split = done.split);
-            (done.mesh, done.atlas.into_charts())
-        }
-        None => (found.mesh, atlas.into_charts()),
-    })
+    let plan = Plan::new(found.mesh, &settings.core(), monitor).map_err(not_cut)?;
+    let Plan { feature_edges, ears_split, .. } = plan;
+    report.decomposition = Some(Decomposition { feature_edges, ears_split, ..Decomposition::default() });
+    Ok(plan)
 }
 
 fn not_cut(error: decompose::Error) -> Stopped {
@@ -288,34 +278,24 @@ fn internal(fault: impl std::fmt::Display) -> Reason {
 ///
 /// # Errors
 /// The refusal of a chart that cannot be mapped, not even split, or that the result is no longer wanted.
-pub fn map(
-    mesh: &SurfaceMesh,
-    chart: Chart,
-    settings: &Settings,
-    monitor: &dyn Monitor,
-) -> Result<Vec<(Chart, MappedChart)>, Stopped> {
-    map_or_split(mesh, chart, settings.order, &settings.decompose(), monitor).map_err(not_mapped)
+pub fn map(job: ChartJob, monitor: &dyn Monitor) -> Result<Vec<MappedChart>, Stopped> {
+    job.map(monitor).map_err(not_mapped)
 }
 
 /// Untangles and certifies a chart, splitting it where it must be.
 ///
 /// # Errors
 /// As [`map`].
-pub fn untangle(
-    mesh: &SurfaceMesh,
-    (chart, mapped): (Chart, MappedChart),
-    settings: &Settings,
-    monitor: &dyn Monitor,
-) -> Result<Vec<(Chart, CertifiedChart)>, Stopped> {
-    finish_or_split(mesh, chart, mapped, settings.order, &settings.decompose(), monitor).map_err(not_mapped)
+pub fn untangle(mapped: MappedChart, monitor: &dyn Monitor) -> Result<Vec<CertifiedChart>, Stopped> {
+    mapped.untangle(monitor).map_err(not_mapped)
 }
 
-fn not_mapped(error: SplitError) -> Stopped {
+fn not_mapped(error: ChartError) -> Stopped {
     let code = match &error {
-        SplitError::Interrupted(_) => return Stopped::Unwanted,
-        SplitError::Map(MapError::Linear(linear::Error::Solver(sparse::Error::TooLarge { .. }))) => Code::TooLarge,
-        SplitError::Map(_) => Code::NeedsSplit,
-        SplitError::Split(_) => Code::Internal,
+        ChartError::Interrupted(_) => return Stopped::Unwanted,
+        ChartError::Map(MapError::Linear(linear::Error::Solver(sparse::Error::TooLarge { .. }))) => Code::TooLarge,
+        ChartError::Map(_) => Code::NeedsSplit,
+        ChartError::Split(_) => Code::Internal,
     };
     Reason::new(code, error).into()
 }
@@ -326,29 +306,21 @@ fn not_mapped(error: SplitError) -> Stopped {
 /// # Errors
 /// Where the result cannot be encoded: a fault of planish.
 pub fn assemble(
-    mesh: &SurfaceMesh,
-    done: Vec<(Chart, CertifiedChart)>,
+    mesh: SurfaceMesh,
+    charts: Vec<CertifiedChart>,
     whole: usize,
     settings: &Settings,
     report: &mut Report,
 ) -> Result<Files, Reason> {
-    let (mut charts, done): (Vec<Chart>, Vec<CertifiedChart>) = done.into_iter().unzip();
-    Atlas::renumber(&mut charts);
     report.decomposition.iter_mut().for_each(|d| d.charts_by_splitting = charts.len() - whole);
-    let size = settings.size.unwrap_or_else(|| hand_off::default_size(mesh));
-    let network = SeamNetwork::new(mesh, &charts, hand_off::NARROW * size);
-    let fields: Vec<_> = charts.iter().zip(&done).map(|(c, d)| distortion::fields(c, &d.certified)).collect();
-    let mut distortions = Vec::with_capacity(charts.len());
-    for ((chart, done), fields) in charts.iter().zip(&done).zip(&fields) {
-        warn_if_unsolved(chart, done);
-        let summary = distortion::summary(chart, &done.certified, fields);
-        report.charts.push(report::chart_report(chart, &network, done, fields, &summary));
-        distortions.push(summary);
-    }
-    report.seams = report::seams(&network);
-    let mut files = encode(mesh, &charts, &done, &fields, &network)?;
+    let atlas = CertifiedAtlas::gather(mesh, charts, settings.size).map_err(internal)?;
+    atlas.charts().iter().for_each(warn_if_unsolved);
+    report.charts = report::charts(&atlas);
+    report.seams = report::seams(atlas.seams());
+    let mut files = encode(&atlas)?;
     if settings.hand_off == settings::HandOff::Gmsh {
-        let handed = hand_off::gmsh(mesh, &charts, &done, &distortions, &network, size);
+        let size = settings.size.unwrap_or_else(|| atlas.mesh().default_size());
+        let handed = hand_off::gmsh(&atlas, size);
         files.extend(handed.files);
         report.hand_off = Some(handed.report);
     }
@@ -362,50 +334,33 @@ pub fn assemble(
 ///
 /// # Errors
 /// The refusal, where a chart cannot be mapped.
-pub fn finish(found: &Repaired, atlas: Atlas, settings: &Settings, report: &mut Report) -> Result<Files, Stopped> {
-    report.surface = Some(report::surface(found));
+pub fn finish(found: Repaired, atlas: Atlas, settings: &Settings, report: &mut Report) -> Result<Files, Stopped> {
+    report.surface = Some(report::surface(&found));
     report.repairs = Some(report::repairs(&found.report));
     report.decomposition = Some(Decomposition::default());
     let whole = atlas.charts().len();
+    let of_charts = settings.core().of_charts();
     let mut done = Vec::new();
     for chart in atlas.into_charts() {
-        for mapped in map(&found.mesh, chart, settings, &NoMonitor)? {
-            done.extend(untangle(&found.mesh, mapped, settings, &NoMonitor)?);
+        for mapped in map(ChartJob { chart, settings: of_charts }, &NoMonitor)? {
+            done.extend(untangle(mapped, &NoMonitor)?);
         }
     }
-    Ok(assemble(&found.mesh, done, whole, settings, report)?)
+    Ok(assemble(found.mesh, done, whole, settings, report)?)
 }
 
-fn warn_if_unsolved(chart: &Chart, done: &CertifiedChart) {
-    if let Some(error) = &done.unsolved {
-        tracing::warn!(chart = %chart.id(), "no harmonic map ({error}): the linear one, raised, is published");
+fn warn_if_unsolved(certified: &CertifiedChart) {
+    if let Some(error) = &certified.provenance().unsolved {
+        tracing::warn!(chart = %certified.id(), "no harmonic map ({error}): the linear one, raised, is published");
     }
 }
 
 /// Encodes what ParaView shows.
-fn encode(
-    mesh: &SurfaceMesh,
-    charts: &[Chart],
-    done: &[CertifiedChart],
-    fields: &[Vec<CellFields>],
-    network: &SeamNetwork,
-) -> Result<Files, Reason> {
-    let none = |chart: &Chart| vec![false; chart.triangles().len()];
-    let invalid = |(c, d): (&_, &CertifiedChart)| d.harmonic.as_ref().map_or(none(c), |h| h.invalid.clone());
-    let untangled: Vec<Vec<bool>> = charts.iter().zip(done).map(invalid).collect();
-    let view = |i: usize| vtu::ChartView {
-        mesh,
-        chart: &charts[i],
-        map: &done[i].certified,
-        fields: &fields[i],
-        untangled: &untangled[i],
-        colour: network.colours()[i],
-    };
-    let views: Vec<_> = (0..charts.len()).map(view).collect();
+fn encode(atlas: &CertifiedAtlas) -> Result<Files, Reason> {
     let files = [
-        ("surface.vtu", vtu::surface(&views).map_err(not_encoded)?),
-        ("param.vtu", vtu::param(&views).map_err(not_encoded)?),
-        ("seams.vtp", vtp::seams(mesh, network).map_err(not_encoded)?),
+        ("surface.vtu", vtu::surface(atlas).map_err(not_encoded)?),
+        ("param.vtu", vtu::param(atlas).map_err(not_encoded)?),
+        ("seams.vtp", vtp::seams(atlas.mesh(), atlas.seams()).map_err(not_encoded)?),
         ("atlas.vtm", vtm::blocks(&ATLAS)),
     ];
     Ok(files.map(|(name, content)| (name.to_owned(), content)).into())

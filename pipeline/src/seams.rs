@@ -115,7 +115,8 @@ impl Curve {
 impl SeamNetwork {
     /// Finds the curves of `charts`, which are those of an atlas of `mesh`, in order. Corners at which an edge of the shape
     /// turns sharply are taken if they are no nearer than `spacing` (in the unit of the input) to others along the curve.
-    pub fn new(mesh: &SurfaceMesh, charts: &[Chart], spacing: f64) -> Self {
+    pub fn new<C: AsRef<Chart>>(mesh: &SurfaceMesh, charts: &[C], spacing: f64) -> Self {
+        let charts: &[&Chart] = &charts.iter().map(AsRef::as_ref).collect::<Vec<_>>();
         let boundary = Boundary::new(mesh, charts);
         let mut corner = boundary.corners();
         kinks::mark(mesh, charts, &boundary, spacing, &mut corner);
@@ -207,7 +208,7 @@ struct Boundary {
 }
 
 impl Boundary {
-    fn new(mesh: &SurfaceMesh, charts: &[Chart]) -> Self {
+    fn new(mesh: &SurfaceMesh, charts: &[&Chart]) -> Self {
         let mut steps = Vec::new();
         let mut loops = Vec::new();
         for chart in charts {

@@ -5,7 +5,6 @@ use crate::job::Stopped;
 use crate::report::Report;
 use parking_lot::Mutex;
 use planish_core::CertifiedChart;
-use planish_core::atlas::Chart;
 use planish_core::mesh::SurfaceMesh;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,16 +15,16 @@ pub(super) type Place = (usize, usize);
 /// A surface that was cut into charts.
 pub(super) struct Surface {
     pub travel: Arc<Travel>,
-    pub mesh: SurfaceMesh,
     /// How many charts decomposition made.
     pub whole: usize,
     parts: Mutex<Parts>,
 }
 
 struct Parts {
+    mesh: Option<SurfaceMesh>,
     report: Report,
     missing: usize,
-    done: BTreeMap<Place, Vec<(Chart, CertifiedChart)>>,
+    done: BTreeMap<Place, Vec<CertifiedChart>>,
     stopped: Option<(Place, Stopped)>,
 }
 
@@ -33,8 +32,8 @@ impl Surface {
     /// A surface of which no chart is mapped yet.
     pub fn new(travel: Arc<Travel>, mesh: SurfaceMesh, whole: usize, report: Report) -> Arc<Self> {
         travel.shared.board.update(travel.number, |job| job.charts = whole);
-        let parts = Parts { report, missing: whole, done: BTreeMap::new(), stopped: None };
-        Arc::new(Self { travel, mesh, whole, parts: Mutex::new(parts) })
+        let parts = Parts { mesh: Some(mesh), report, missing: whole, done: BTreeMap::new(), stopped: None };
+        Arc::new(Self { travel, whole, parts: Mutex::new(parts) })
     }
 
     /// Whether the part at `place` is still to be done. Where one of several parts stops the job, it is always the first
@@ -50,7 +49,7 @@ impl Surface {
     }
 
     /// A part is done, or stopped. Whether it was the last one.
-    pub fn deposit(&self, place: Place, part: Result<Vec<(Chart, CertifiedChart)>, Stopped>) -> bool {
+    pub fn deposit(&self, place: Place, part: Result<Vec<CertifiedChart>, Stopped>) -> bool {
         self.travel.shared.board.update(self.travel.number, |job| job.charts_done += 1);
         let mut parts = self.parts.lock();
         match part {
@@ -64,11 +63,16 @@ impl Surface {
         parts.missing == 0
     }
 
-    /// The report so far and all charts in order, or why there are not all.
-    pub fn collect(&self) -> (Report, Result<Vec<(Chart, CertifiedChart)>, Stopped>) {
+    /// The report so far, and the surface with all charts in order, or why there are not all. Once: nothing is left here.
+    pub fn collect(&self) -> (Report, Result<(SurfaceMesh, Vec<CertifiedChart>), Stopped>) {
         let mut parts = self.parts.lock();
         let done = std::mem::take(&mut parts.done).into_values().flatten().collect();
-        (parts.report.clone(), parts.stopped.take().map_or(Ok(done), |(_, why)| Err(why)))
+        let collected = match (parts.stopped.take(), parts.mesh.take()) {
+            (None, Some(mesh)) => Ok((mesh, done)),
+            (Some((_, why)), _) => Err(why),
+            (None, None) => Err(Stopped::Unwanted),
+        };
+        (parts.report.clone(), collected)
     }
 }
 

@@ -71,7 +71,8 @@ pub(super) fn write(finished: Finished, after: &After) {
             let (mut report, done) = surface.collect();
             let travel = surface.travel.clone();
             let assembled = travel.compute(Stage::Write, |_| {
-                Ok(stages::assemble(&surface.mesh, done?, surface.whole, &travel.settings, &mut report)?)
+                let (mesh, charts) = done?;
+                Ok(stages::assemble(mesh, charts, surface.whole, &travel.settings, &mut report)?)
             });
             (travel, report, assembled)
         }

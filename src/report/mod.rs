@@ -9,7 +9,7 @@ use crate::formats::Notes;
 use crate::outcome::{Reason, Status};
 use crate::settings::{self, Settings};
 use crate::shown::printable_json;
-pub use build::{certificate, chart_checksum, chart_report, repairs, seams, surface};
+pub use build::{certificate, chart_checksum, charts, repairs, seams, surface};
 use planish_core::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -64,7 +64,7 @@ fn write_labelled(
     let atlas = assemble(&found.mesh, &labels).expect("legal");
     let input = Input { name: "labelled".to_owned(), bytes: None, blake3: None, beside: vec![] };
     let mut report = Report::new(input, settings);
-    let files = stages::finish(&found, atlas, settings, &mut report).expect("mapped");
+    let files = stages::finish(found, atlas, settings, &mut report).expect("mapped");
     std::fs::create_dir_all(folder).expect("made");
     files.iter().for_each(|(name, content)| std::fs::write(folder.join(name), content).expect("written"));
     std::fs::write(folder.join("report.json"), report.to_json().expect("JSON")).expect("written");

@@ -95,10 +95,10 @@ pub(crate) fn singular_ratio(first: [f64; 2], second: [f64; 2], det: f64) -> f64
 }
 
 /// Sums up the fields of a chart. Triangles whose shape mollification changed by more than 1 % are left out of the
-/// conformal quantiles (unless all are).
-pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summary {
+/// conformal quantiles (unless all are). `area_ratio` is that of the chart (see [`area_ratio()`]).
+pub fn summary(chart: &Chart, fields: &[CellFields], area_ratio: f64) -> Summary {
     let [conformal_median, conformal_p99] = conformal_quantiles(chart, |f| fields[f].conformal_distortion, [0.5, 0.99]);
-    Summary { conformal_median, conformal_p99, area_ratio: area_ratio(chart, map) }
+    Summary { conformal_median, conformal_p99, area_ratio }
 }
 
 /// The conformal distortion that 99 % of the area does not exceed, of a map that may be invalid here and there, by the
@@ -189,7 +189,8 @@ pub(crate) fn quantiles<const N: usize>(weighted: &mut [(f64, f64)], shares: [f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Order, decompose, finish_chart, map_chart, repair, shapes};
+    use crate::parametrize::parametrize_chart;
+    use crate::{Order, decompose, repair, shapes};
 
     #[test]
     fn quantiles_follow_the_weights() {
@@ -204,16 +205,15 @@ mod tests {
             let soup = crate::mesh::TriangleSoup::new(points, soup.triangles().to_vec()).expect("sound");
             let mesh = repair(&soup, &Default::default()).expect("a surface").mesh;
             let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart");
-            let chart = &atlas.charts()[0];
-            let done = finish_chart(map_chart(chart, Order::Quadratic).expect("maps"));
-            let fields = fields(chart, &done.certified);
-            for f in &fields {
+            let chart = atlas.into_charts().remove(0);
+            let done = parametrize_chart(chart, Order::Quadratic).expect("maps");
+            for f in done.fields() {
                 assert!(f.det_min > 0.0 && f.det_min <= f.det_max && f.det_max.is_finite(), "{f:?}");
                 assert!(f.jacobian_ratio > 0.0 && f.jacobian_ratio <= 1.0);
                 assert!(f.conformal_distortion >= 1.0 && f.conformal_distortion.is_finite());
                 assert!(f.area_scale > 0.0 && f.area_scale.is_finite());
             }
-            let s = summary(chart, &done.certified, &fields);
+            let s = done.distortion();
             assert!(s.conformal_median <= s.conformal_p99 && s.area_ratio >= 1.0 && s.area_ratio.is_finite());
         }
     }

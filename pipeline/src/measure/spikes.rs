@@ -56,7 +56,7 @@ pub struct Spike {
 
 /// The spikes and pits inside `charts` that a mesh with edges of length `size` would cut off, from the widest to the
 /// thinnest. `curvatures` are those of the vertices of `mesh`, more may follow.
-pub fn spikes(mesh: &SurfaceMesh, charts: &[Chart], curvatures: &[Principal], size: f64) -> Vec<Spike> {
+pub fn spikes<C: AsRef<Chart>>(mesh: &SurfaceMesh, charts: &[C], curvatures: &[Principal], size: f64) -> Vec<Spike> {
     let mut search = Search::new(mesh, charts);
     let bends: Vec<f64> = angles(mesh)
         .iter()
@@ -124,10 +124,10 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(mesh: &'a SurfaceMesh, charts: &[Chart]) -> Self {
+    fn new<C: AsRef<Chart>>(mesh: &'a SurfaceMesh, charts: &[C]) -> Self {
         let mut chart = vec![u32::MAX; mesh.triangles().len()];
         for (c, id) in charts.iter().zip(0..) {
-            c.faces().iter().for_each(|f| chart[f.index()] = id);
+            c.as_ref().faces().iter().for_each(|f| chart[f.index()] = id);
         }
         let mut beside = vec![u32::MAX; mesh.points().len()];
         for (t, face) in mesh.triangles().iter().zip(0..) {

@@ -18,7 +18,7 @@ const SCALES: [usize; 3] = [1, 2, 4];
 
 /// Marks the vertices as corners in which edges of the shape turn sharply, the sharpest first, if there is no corner within
 /// `spacing` along the curve yet. `corner` tells the others.
-pub(super) fn mark(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, spacing: f64, corner: &mut [bool]) {
+pub(super) fn mark(mesh: &SurfaceMesh, charts: &[&Chart], boundary: &Boundary, spacing: f64, corner: &mut [bool]) {
     let chains = Chains::new(mesh, boundary, corner);
     let is_shape: Vec<bool> = (0..boundary.by_segment.len()).map(|s| is_shape(mesh, charts, boundary, s)).collect();
     let of_shape = |v: &usize| chains.is_inner(*v) && chains.segments[*v].iter().all(|s| is_shape[*s as usize]);
@@ -40,7 +40,7 @@ pub(super) fn mark(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, sp
 }
 
 /// Whether a segment is an edge of the shape: open boundary, an edge of several sheets, or a sharp edge between two charts.
-fn is_shape(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, segment: usize) -> bool {
+fn is_shape(mesh: &SurfaceMesh, charts: &[&Chart], boundary: &Boundary, segment: usize) -> bool {
     let steps: Vec<_> = boundary.by_segment[segment].iter().map(|s| boundary.steps[*s as usize]).collect();
     let [a, b] = steps[..] else { return true };
     let normal = |step: &super::Step| {

@@ -18,7 +18,6 @@ use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
 use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, quantiles, singular_ratio};
-use crate::mesh::SurfaceMesh;
 use crate::monitor::Monitor;
 pub use conformal::conformal;
 pub use projection::projection;
@@ -49,9 +48,9 @@ const UNROLLED: usize = 20_000;
 /// of the area where a chart is projected (pins_instanced, at 303: 38 elements below gamma 0.1).
 const EVEN: f64 = 100.0;
 
-/// A natural map that stretches `chart`, one of `mesh`, less than `on_disk`, the conformal distortion that its map on
+/// A natural map that stretches `chart` less than `on_disk`, the conformal distortion that its map on
 /// the disk does not exceed on 99 % of the area; none where there is none, or that is not found by reasonable means.
-pub fn natural(mesh: &SurfaceMesh, chart: &Chart, on_disk: f64, monitor: &dyn Monitor) -> Option<Natural> {
+pub fn natural(chart: &Chart, on_disk: f64, monitor: &dyn Monitor) -> Option<Natural> {
     let unrolled = || {
         let is_wanted = on_disk > UNEVEN && chart.triangles().len() <= UNROLLED;
         // Where the system cannot be solved, there is the map on the disk.
@@ -59,7 +58,7 @@ pub fn natural(mesh: &SurfaceMesh, chart: &Chart, on_disk: f64, monitor: &dyn Mo
         found.filter(|n| n.distortion.conformal_p99 < on_disk)
     };
     let is_even = |n: &Natural| n.distortion.area_ratio < EVEN;
-    projection(mesh, chart, on_disk.min(STEEP)).filter(is_even).or_else(unrolled).filter(is_even)
+    projection(chart, on_disk.min(STEEP)).filter(is_even).or_else(unrolled).filter(is_even)
 }
 
 /// The map with the nodes of a chart at `places` (its vertices, then the middles of its edges), scaled to fit and
@@ -125,11 +124,10 @@ mod tests {
     use crate::vec3::Vec3;
     use crate::{decompose, repair, shapes};
 
-    fn charts(soup: &TriangleSoup) -> (SurfaceMesh, Vec<Chart>) {
+    fn charts(soup: &TriangleSoup) -> Vec<Chart> {
         let mesh = repair(soup, &Default::default()).expect("repairs").mesh;
         let no_features = decompose::Settings { feature_angle: None, ..Default::default() };
-        let atlas = decompose(&mesh, &no_features, &NoMonitor).expect("decomposes");
-        (mesh, atlas.into_charts())
+        decompose(&mesh, &no_features, &NoMonitor).expect("decomposes").into_charts()
     }
 
     fn moved(soup: &TriangleSoup, to: impl Fn(Vec3) -> Vec3) -> TriangleSoup {
@@ -140,16 +138,16 @@ mod tests {
     #[test]
     fn a_plate_with_holes_is_projected_as_it_is_and_a_dome_as_far_as_it_is_flat() {
         let flat = moved(&shapes::disk_with_holes(13, 2), |[x, y, _]| [5.0 + 0.6 * x, y, -0.8 * x]);
-        let (mesh, plate) = charts(&flat);
-        let of_plate = projection(&mesh, &plate[0], 1.1).expect("it is flat").distortion;
+        let plate = charts(&flat);
+        let of_plate = projection(&plate[0], 1.1).expect("it is flat").distortion;
         assert!(
             (of_plate.conformal_p99 - 1.0).abs() < 1e-9 && (of_plate.area_ratio - 1.0).abs() < 1e-9,
             "{of_plate:?}"
         );
-        let (mesh, dome) = charts(&shapes::disk(8));
-        let steep = projection(&mesh, &dome[0], 4.0).expect("hardly bent").distortion.conformal_p99;
+        let dome = charts(&shapes::disk(8));
+        let steep = projection(&dome[0], 4.0).expect("hardly bent").distortion.conformal_p99;
         assert!(steep > 1.05, "{steep}");
-        assert!(projection(&mesh, &dome[0], 0.99 * steep).is_none(), "the bound holds");
+        assert!(projection(&dome[0], 0.99 * steep).is_none(), "the bound holds");
     }
 
     #[test]
@@ -168,8 +166,8 @@ mod tests {
             [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
         };
         let soup = TriangleSoup::new(points, quads.flat_map(halves).collect()).expect("sound");
-        let (mesh, strip) = charts(&soup);
-        assert!(projection(&mesh, &strip[0], f64::MAX).is_none(), "it turns back");
+        let strip = charts(&soup);
+        assert!(projection(&strip[0], f64::MAX).is_none(), "it turns back");
         let unrolled = conformal(&strip[0], &NoMonitor).expect("unrolled").expect("one-to-one").distortion;
         assert!((unrolled.conformal_p99 - 1.0).abs() < 1e-6 && unrolled.area_ratio < 1.0 + 1e-6, "{unrolled:?}");
     }
@@ -186,15 +184,15 @@ mod tests {
         let points = (0..2 * (n + 1)).map(point).collect();
         let halves = |i: u32| [[2 * i, 2 * i + 1, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 2]];
         let soup = TriangleSoup::new(points, (0..n).flat_map(halves).collect()).expect("sound");
-        let (mesh, ramp) = charts(&soup);
+        let ramp = charts(&soup);
         assert_eq!(ramp.len(), 1);
-        assert!(projection(&mesh, &ramp[0], f64::MAX).is_none());
+        assert!(projection(&ramp[0], f64::MAX).is_none());
         assert!(conformal(&ramp[0], &NoMonitor).expect("solved").is_none());
     }
 
     #[test]
     fn a_hemisphere_is_mapped_conformally() {
-        let (_, halves) = charts(&shapes::sphere(12));
+        let halves = charts(&shapes::sphere(12));
         let of = conformal(&halves[0], &NoMonitor).expect("solved").expect("one-to-one").distortion;
         assert!(of.conformal_p99 < 1.6, "{of:?}");
     }
