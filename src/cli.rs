@@ -1,7 +1,6 @@
 //! The command line.
 
 use crate::settings::{FeatureAngle, HandOff, Inputs, Log, Refused, Said, Settings, SettingsError};
-use crate::verbs::check_mesh::Question;
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -234,14 +233,6 @@ pub struct Check {
     /// Shared options
     #[command(flatten)]
     pub common: Common,
-}
-
-impl Check {
-    /// What is asked of a mesh, if one is given.
-    pub fn question(&self) -> Option<Question> {
-        let Self { size, min_gamma, json, .. } = *self;
-        Some(Question { mesh: self.mesh.clone()?, size, min_gamma, json })
-    }
 }
 
 /// `planish info`

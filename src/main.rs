@@ -2,8 +2,9 @@
 
 use clap::Parser;
 use planish::cli::{Cli, Verb};
+use planish::operating::logging;
+use planish::settings::Settings;
 use planish::verbs::{self, Exit};
-use planish::{logging, settings::Settings};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -24,7 +25,7 @@ fn dispatch(verb: &Verb, settings: &Settings) -> Result<Exit, Box<dyn std::error
     match verb {
         Verb::Run(run) => verbs::run::run(&run.inputs, settings),
         Verb::Watch(watch) => verbs::watch::watch(watch, settings, &|| verb.settings()),
-        Verb::Check(check) => match check.question() {
+        Verb::Check(check) => match verbs::check_mesh::Question::of(check) {
             Some(question) => verbs::check_mesh::check_mesh(&check.results, &question, settings),
             None => Ok(verbs::check::check(&check.results, settings.quiet)),
         },

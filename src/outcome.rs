@@ -1,6 +1,6 @@
 //! How an input ended: certified, refused or failed, and why.
 
-use crate::shown::printable;
+use crate::system::escape::printable;
 use serde::{Deserialize, Serialize};
 
 /// The state of an input.
@@ -97,6 +97,21 @@ impl Reason {
     /// The state that this reason leads to.
     pub fn status(&self) -> Status {
         if matches!(self.code, Code::Internal | Code::Crashed) { Status::Failed } else { Status::Refused }
+    }
+}
+
+/// Why work on a job stopped.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stopped {
+    /// It is refused, or failed.
+    For(Reason),
+    /// Nobody wants the result any more.
+    Unwanted,
+}
+
+impl From<Reason> for Stopped {
+    fn from(reason: Reason) -> Self {
+        Self::For(reason)
     }
 }
 

@@ -3,8 +3,8 @@
 
 use crate::corpus::{manifest, shared};
 use planish::formats::{Format, Kind, kind};
+use planish::input::{Folder, decode};
 use planish::settings::{Said, Settings};
-use planish::stages::{Folder, decode};
 use planish_core::topology::Census;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -3,7 +3,7 @@
 
 use super::budget::{Account, Budget};
 use super::queue::Turn;
-use super::turnstile::Turnstile;
+use super::semaphore::Turnstile;
 
 /// Grants places and memory. Who holds a place waits for nothing else; see [`super`].
 pub(super) trait Grants: Send + Sync {

@@ -4,7 +4,7 @@
 //! (self-clocked fair queueing; Golestani 1994, doi 10.1109/INFCOM.1994.337677). So small files pass a large one that
 //! came before them, but only until as many bytes as it has were done: nobody waits for ever.
 
-use crate::job::Job;
+use crate::input::job::Job;
 use parking_lot::{Condvar, Mutex};
 use std::collections::BTreeMap;
 use std::sync::Arc;

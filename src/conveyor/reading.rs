@@ -1,15 +1,17 @@
 //! Taking inputs up: what is up to date is left, what is large goes to a process of its own, all else is decoded.
 
 use super::apart::stage::Apart;
-use super::travel::Travel;
+use super::completion::{Done, End};
+use super::in_flight::Travel;
+use super::stage::Stage;
 use super::{Chained, Finished, Soup, hand_on, published, unwritten};
-use crate::begun::MOST_DEATHS;
 use crate::formats::{Content, Notes};
-use crate::job::{Done, End, Job, Stage, Stopped};
-use crate::ledger;
-use crate::outcome::{Code, Reason};
+use crate::input::job::Job;
+use crate::input::{self, Folder};
+use crate::outcome::{Code, Reason, Stopped};
+use crate::output::begun::MOST_DEATHS;
+use crate::output::ledger;
 use crate::report::{Input, Report};
-use crate::stages::{self, Folder};
 use blake3::Hash;
 use crossbeam_channel::Sender;
 use std::sync::Arc;
@@ -50,7 +52,7 @@ pub(super) fn read(travel: Arc<Travel>, next: &Next) {
 /// Sees whether an input still has the content that was processed.
 fn doubt(travel: &Travel, hash: Hash) {
     let _in_stage = travel.in_stage(Stage::Read);
-    travel.end(match stages::hash_input(&travel.job, &travel.settings) {
+    travel.end(match input::hash_input(&travel.job, &travel.settings) {
         Ok((now, _)) if now == hash => End::Same,
         Err(refusal) if refusal.passes => End::Again(refusal.reason),
         _ => {
@@ -69,7 +71,7 @@ fn is_apart(travel: &Travel) -> bool {
 
 fn read_here(travel: Arc<Travel>, next: &Next) {
     travel.mark();
-    let content = stages::read_input(&travel.job, &travel.settings);
+    let content = input::read_input(&travel.job, &travel.settings);
     if !travel.job.is_unchanged() {
         return travel.end(End::Changed);
     }
@@ -85,12 +87,12 @@ fn read_here(travel: Arc<Travel>, next: &Next) {
         match up_to_date(&travel, &report, &folder) {
             Some(older) => Ok(Err(older)),
             None => {
-                let content = stages::decode(&travel.job.path, &bytes, &travel.settings, &folder);
+                let content = input::decode(&travel.job.path, &bytes, &travel.settings, &folder);
                 let content = content.map_err(|refusal| {
                     report.content = refusal.notes.map(|notes| *notes);
                     refusal.reason
                 })?;
-                stages::check_memory(&content.soup, &travel.settings)?;
+                input::check_memory(&content.soup, &travel.settings)?;
                 Ok(Ok(content))
             }
         }
@@ -132,7 +134,7 @@ fn leave(travel: Arc<Travel>, older: Report, next: &Next) {
 /// An input of which nothing is kept here: neither its bytes nor what becomes of them.
 fn read_apart(travel: Arc<Travel>, next: &Next) {
     // Who waits for a disk holds no place to compute.
-    let hashed = stages::hash_input(&travel.job, &travel.settings);
+    let hashed = input::hash_input(&travel.job, &travel.settings);
     if !travel.job.is_unchanged() {
         return travel.end(End::Changed);
     }

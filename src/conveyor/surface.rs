@@ -1,7 +1,7 @@
 //! A surface whose charts are on their way: they are put together when the last one is in.
 
-use super::travel::Travel;
-use crate::job::Stopped;
+use super::in_flight::Travel;
+use crate::outcome::Stopped;
 use crate::report::Report;
 use parking_lot::Mutex;
 use planish_core::CertifiedChart;
@@ -78,7 +78,7 @@ impl Surface {
 
 #[cfg(test)]
 mod tests {
-    use super::super::travel::tests::{begin, shared};
+    use super::super::in_flight::tests::{begin, shared};
     use super::*;
     use crate::outcome::{Code, Reason};
     use crate::report::Input;

@@ -1,13 +1,15 @@
 //! Putting results in their place, and trying again where the system gets in the way for a while.
 
-use super::travel::Travel;
+use super::completion::{Done, End};
+use super::in_flight::Travel;
+use super::stage::Stage;
 use super::{Chained, Finished, log, published, unwritten};
-use crate::job::{Done, End, Stage, Stopped};
-use crate::outcome::{Code, Reason};
-use crate::passing;
-use crate::publish::{self, PublishError, Publisher, Staged};
-use crate::report::{self, Report};
+use crate::outcome::{Code, Reason, Stopped};
+use crate::output::publish::{self, PublishError, Publisher, Staged};
+use crate::report::Report;
+use crate::result_files;
 use crate::stages::{self, Files};
+use crate::system::passing;
 use bytesize::ByteSize;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
 use std::path::PathBuf;
@@ -88,7 +90,7 @@ pub(super) fn write(finished: Finished, after: &After) {
     report.timing = travel.timing();
     match report.to_json() {
         Ok(text) => {
-            files.push((report::FILE.to_owned(), text));
+            files.push((result_files::REPORT.to_owned(), text));
             put(Ready { travel, report, content: Made::Files(files) }, after);
         }
         Err(error) => {

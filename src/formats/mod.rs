@@ -22,7 +22,8 @@ mod vtk;
 mod words;
 
 use crate::outcome::{Code, Reason};
-pub use content::{Beside, Content, Limits, Notes, Nothing, Source, TooMany};
+pub use crate::settings::Limits;
+pub use content::{Beside, Content, Notes, Nothing, Source, TooMany};
 pub use patches::Patches;
 use place::Place;
 use planish_core::mesh::SoupError;

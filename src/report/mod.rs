@@ -8,7 +8,7 @@ mod warnings;
 use crate::formats::Notes;
 use crate::outcome::{Reason, Status};
 use crate::settings::{self, Settings};
-use crate::shown::printable_json;
+use crate::system::escape::printable_json;
 pub use build::{certificate, chart_checksum, charts, repairs, seams, surface};
 use planish_core::Order;
 use serde::{Deserialize, Serialize};
@@ -17,9 +17,6 @@ pub use warnings::{Doubt, Warning, warnings};
 
 /// The version of the schema.
 pub const SCHEMA: u32 = 1;
-
-/// The name of the report in a result folder.
-pub const FILE: &str = "report.json";
 
 /// The whole report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,6 +1,6 @@
 //! The values that settings can have.
 
-use crate::formats::Limits;
+use super::Limits;
 use bytesize::ByteSize;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;

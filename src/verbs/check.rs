@@ -6,22 +6,23 @@
 //! fails the first one even if all checksums were made anew.
 
 use super::{Exit, complain, say, shown};
-use crate::formats::gmsh;
 use crate::formats::vtu::{self, Grid};
-use crate::ledger;
+use crate::input::read_file;
 use crate::outcome::{Reason, Status};
+use crate::output::ledger;
 use crate::report::{self, ChartReport, Report, certificate, chart_checksum};
+use crate::result_files;
 use crate::settings::HandOff;
-use crate::stages::{guard, read_file};
+use crate::stages::guard;
 use planish_core::certify::{self, PlanarMap, prove};
 use planish_core::grid::GridPoint;
 use std::path::{Path, PathBuf};
 
 /// The files that every certified result has.
-const REQUIRED: [&str; 4] = ["surface.vtu", "param.vtu", "seams.vtp", "atlas.vtm"];
+const REQUIRED: [&str; 4] = [result_files::SURFACE, result_files::PARAM, result_files::SEAMS, result_files::ATLAS_VTM];
 
 /// The files of a hand-off to Gmsh.
-const HANDED_OFF: [&str; 2] = [gmsh::ATLAS, gmsh::REMESH];
+const HANDED_OFF: [&str; 2] = [result_files::ATLAS_MSH, result_files::REMESH];
 
 /// What can be wrong with a result.
 #[derive(Debug, thiserror::Error)]
@@ -54,7 +55,7 @@ pub fn check(results: &[PathBuf], quiet: bool) -> Exit {
         let name = shown(path);
         let found = match folder(path) {
             Some(folder) => guard(|| Ok(check_one(folder))).unwrap_or_else(|broken: Reason| Findings {
-                wrong: vec![file(report::FILE, broken.message)],
+                wrong: vec![file(result_files::REPORT, broken.message)],
                 ..Findings::default()
             }),
             None => Findings {
@@ -78,7 +79,7 @@ pub(super) fn folder(path: &Path) -> Option<&Path> {
     if path.is_dir() {
         return Some(path);
     }
-    let named = path.is_file() && path.file_name() == Some(report::FILE.as_ref());
+    let named = path.is_file() && path.file_name() == Some(result_files::REPORT.as_ref());
     let parent = path.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
     parent.filter(|_| named)
 }
@@ -93,7 +94,7 @@ fn check_one(folder: &Path) -> Findings {
         }
     };
     found.wrong.extend(check_outputs(folder, &report));
-    match read_grid(folder, "surface.vtu") {
+    match read_grid(folder, result_files::SURFACE) {
         Ok(grid) => {
             found.wrong.extend(check_surface(&grid, &report));
             for (index, chart) in report.charts.iter().enumerate() {
@@ -114,15 +115,15 @@ pub(super) fn read(folder: &Path, name: &str) -> Result<Vec<u8>, Finding> {
 }
 
 pub(super) fn read_report(folder: &Path) -> Result<Report, Finding> {
-    let bytes = read(folder, report::FILE)?;
-    let report: Report = serde_json::from_slice(&bytes).map_err(|e| file(report::FILE, e))?;
+    let bytes = read(folder, result_files::REPORT)?;
+    let report: Report = serde_json::from_slice(&bytes).map_err(|e| file(result_files::REPORT, e))?;
     if report.schema != report::SCHEMA {
         let problem = format!("schema {} is not {}, which this version checks", report.schema, report::SCHEMA);
-        return Err(file(report::FILE, problem));
+        return Err(file(result_files::REPORT, problem));
     }
     match (report.status, &report.reason) {
         (Status::Certified, None) => Ok(report),
-        (Status::Certified, Some(_)) => Err(file(report::FILE, "it is certified and has a reason against it")),
+        (Status::Certified, Some(_)) => Err(file(result_files::REPORT, "it is certified and has a reason against it")),
         (status, _) => Err(Finding::NotCertified(status)),
     }
 }
@@ -134,7 +135,7 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
     let failed = report.hand_off.as_ref().is_some_and(|h| h.failure.is_some());
     let handed_off = HANDED_OFF.iter().filter(|_| asked_for && !failed);
     let is_enlarged = report.hand_off.as_ref().is_some_and(|h| h.enlarged != 1.0);
-    let enlarged = [gmsh::ENLARGED];
+    let enlarged = [result_files::ENLARGED_MSH];
     let missing = REQUIRED
         .iter()
         .chain(handed_off)
@@ -161,7 +162,7 @@ fn read_grid(folder: &Path, name: &str) -> Result<Grid, Finding> {
 
 /// Every triangle of the surface must be in a chart, positions and fields must be numbers that can be.
 fn check_surface(grid: &Grid, report: &Report) -> Vec<Finding> {
-    let wrong = |problem: String| file("surface.vtu", problem);
+    let wrong = |problem: String| file(result_files::SURFACE, problem);
     let mut found = Vec::new();
     let accounted = report.charts.iter().map(|c| c.triangles).try_fold(0_usize, usize::checked_add);
     if accounted != Some(grid.cells.len()) || report.charts.is_empty() {
@@ -254,13 +255,13 @@ fn unproven(grid: &Grid, cells: &[usize], chart: u32, error: certify::Error) -> 
 
 /// param.vtu must show the same map: same cells, fields and uv, points at uv plus the shift of their chart.
 fn check_param(folder: &Path, surface: &Grid, charts: usize) -> Result<(), Finding> {
-    let param = read_grid(folder, "param.vtu")?;
+    let param = read_grid(folder, result_files::PARAM)?;
     let same = param.cells == surface.cells
         && param.uv == surface.uv
         && (&param.chart, &param.triangle, &param.vertex) == (&surface.chart, &surface.triangle, &surface.vertex)
         && param.fields == surface.fields;
     if !same {
-        return Err(file("param.vtu", "its cells, fields or uv differ from those of surface.vtu"));
+        return Err(file(result_files::PARAM, "its cells, fields or uv differ from those of surface.vtu"));
     }
     for (cell, chart) in param.cells.iter().zip(&param.chart) {
         let [x, y] = vtu::shift(usize::try_from(*chart).unwrap_or(0), charts);
@@ -269,7 +270,7 @@ fn check_param(folder: &Path, surface: &Grid, charts: usize) -> Result<(), Findi
             p != [uv[0] + x, uv[1] + y, 0.0]
         };
         if let Some(node) = cell.iter().find(off) {
-            return Err(file("param.vtu", format!("point {node} does not lie at its uv")));
+            return Err(file(result_files::PARAM, format!("point {node} does not lie at its uv")));
         }
     }
     Ok(())

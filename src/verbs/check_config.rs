@@ -6,9 +6,8 @@
 
 use super::watch::{destinations, no_inbox, refuse_metrics, refuse_nested, takes_inputs_out};
 use super::{Exit, complain, say, shown};
-use crate::hooks::Hook;
-use crate::publish::STAGING;
-use crate::settings::Settings;
+use crate::output::publish::STAGING;
+use crate::settings::{Hook, Settings};
 use rustix::fs::{Access, access};
 use std::path::{Path, PathBuf};
 

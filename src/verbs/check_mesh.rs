@@ -5,15 +5,18 @@
 
 use super::check::{folder, read_report};
 use super::{Exit, complain, say, say_json, shown};
-use crate::disk::{self, Disk, System};
+use crate::cli;
 use crate::formats::gmsh;
 use crate::formats::vtu::{self, Shape};
 use crate::formats::{self, Kind, Nothing, Patches, READ, Source};
+use crate::input::read_file_into;
 use crate::outcome::Reason;
 use crate::report::mesh::{MeshReport, PLACES};
 use crate::report::{Output, Report};
+use crate::result_files;
 use crate::settings::Settings;
-use crate::stages::{guard, read_file_into};
+use crate::stages::guard;
+use crate::system::disk::{self, Disk, System};
 use planish_core::soundness::{self, HandedOverAtlas, Mesh, Triangulation};
 use std::path::{Path, PathBuf};
 
@@ -30,8 +33,13 @@ pub struct Question {
     pub json: bool,
 }
 
-/// The file in the result folder that keeps what was found.
-pub const FILE: &str = "mesh.json";
+impl Question {
+    /// What is asked of a mesh, if one is given.
+    pub fn of(asked: &cli::Check) -> Option<Self> {
+        let cli::Check { size, min_gamma, json, .. } = *asked;
+        Some(Self { mesh: asked.mesh.clone()?, size, min_gamma, json })
+    }
+}
 
 /// How far nodes may be off the surface, relative to its diagonal: single precision rounds by a tenth of that.
 const OFF_SURFACE: f64 = 1e-6;
@@ -88,7 +96,7 @@ pub fn check_mesh(
         say(&text(&name, &report));
     }
     if let Err(error) = keep(folder, &report) {
-        complain(&format!("{}: cannot be written: {error}", shown(&folder.join(FILE))));
+        complain(&format!("{}: cannot be written: {error}", shown(&folder.join(result_files::MESH))));
         return Ok(Exit::Refused);
     }
     if !report.faithful {
@@ -117,7 +125,8 @@ fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<Mesh
 
 /// The surface of a result, as it was published, and the chart of each triangle.
 fn surface(folder: &Path, report: &Report, bytes: &mut Vec<u8>) -> Result<(Output, Triangulation, Vec<u32>), Unjudged> {
-    let file = published(folder, report, "surface.vtu", bytes)?.ok_or(Unjudged::Changed("surface.vtu"))?;
+    let file =
+        published(folder, report, result_files::SURFACE, bytes)?.ok_or(Unjudged::Changed(result_files::SURFACE))?;
     let shape = vtu::read_shape(bytes).map_err(|e| Unjudged::Told(format!("surface.vtu: {e}")))?;
     let charts = shape.chart.iter().map(|c| u32::try_from(*c).unwrap_or(u32::MAX)).collect();
     Ok((file, corners_of(&shape), charts))
@@ -138,8 +147,8 @@ fn corners_of(shape: &Shape) -> Triangulation {
 
 /// The maps that the mesher used, if the result has any.
 fn atlas(folder: &Path, report: &Report, bytes: &mut Vec<u8>) -> Result<Option<HandedOverAtlas>, Unjudged> {
-    let Some(_) = published(folder, report, gmsh::ATLAS, bytes)? else { return Ok(None) };
-    let atlas = gmsh::read_atlas(bytes).map_err(|e| Unjudged::Told(format!("{}: {e}", gmsh::ATLAS)))?;
+    let Some(_) = published(folder, report, result_files::ATLAS_MSH, bytes)? else { return Ok(None) };
+    let atlas = gmsh::read_atlas(bytes).map_err(|e| Unjudged::Told(format!("{}: {e}", result_files::ATLAS_MSH)))?;
     Ok(Some(atlas))
 }
 
@@ -189,7 +198,7 @@ fn keep(folder: &Path, report: &MeshReport) -> std::io::Result<()> {
     let mut text = serde_json::to_string_pretty(report)?;
     text.push('\n');
     let folder = System.open(folder)?;
-    disk::replace_file(&folder, &folder, FILE, text.as_bytes())
+    disk::replace_file(&folder, &folder, result_files::MESH, text.as_bytes())
 }
 
 /// What was found, for people.

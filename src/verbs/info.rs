@@ -2,12 +2,12 @@
 
 use super::{Exit, say, say_json, shown};
 use crate::formats::{Content, Notes};
-use crate::inputs;
-use crate::job::Job;
+use crate::input::job::Job;
+use crate::input::{self, Folder, decode, read_input};
 use crate::outcome::Reason;
 use crate::report::{self, Counts, Repairs, Surface, Warning};
 use crate::settings::Settings;
-use crate::stages::{Folder, check_sheets, decode, guard, read_input, repaired};
+use crate::stages::{check_sheets, guard, repaired};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ struct Answer {
 /// Wrong usage.
 pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     let mut exit = Exit::Success;
-    for job in inputs::collect(paths)? {
+    for job in input::collect(paths)? {
         let answer = answer(&job, settings);
         if answer.reason.is_some() {
             exit = Exit::Refused;

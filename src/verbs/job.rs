@@ -1,13 +1,14 @@
 //! `planish job`: one input, for another planish that started this process, and puts the result in place.
 
 use super::Exit;
-use crate::begun;
 use crate::cli::Apart;
+use crate::conveyor::Conveyor;
 use crate::conveyor::apart::parent::Parent;
 use crate::conveyor::apart::protocol::{Ending, Order, Said, say};
-use crate::conveyor::{Conveyor, Ended};
-use crate::job::{End, Job};
+use crate::conveyor::completion::{End, Ended};
+use crate::input::job::Job;
 use crate::outcome::{Code, Reason};
+use crate::output::begun;
 use crate::settings::Settings;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use std::fs::File;

@@ -38,7 +38,7 @@ pub fn complain(line: &str) {
     let _ = writeln!(std::io::stderr(), "planish: {}", printable_lines(line));
 }
 
-use crate::shown::{printable_json, printable_lines, shown};
+use crate::system::escape::{printable_json, printable_lines, shown};
 
 /// Every verb says how it ended: the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

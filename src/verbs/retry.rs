@@ -2,15 +2,15 @@
 //! runs, which looks for results that were removed, or by the next one.
 
 use super::{Exit, complain, say};
-use crate::begun;
-use crate::ledger::Entry;
+use crate::operating::status;
 use crate::outcome::Status;
-use crate::regular;
-use crate::report;
+use crate::output::begun;
+use crate::output::ledger::Entry;
+use crate::output::withdraw::{Standing, WithdrawError};
+use crate::result_files;
 use crate::settings::Settings;
-use crate::shown::shown;
-use crate::status;
-use crate::withdraw::{Standing, WithdrawError};
+use crate::system::escape::shown;
+use crate::system::safe_open;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -80,5 +80,5 @@ fn remove(out: &Path, name: &Path) -> Result<(), Refused> {
 
 /// What the report of a result says.
 fn entry(out: &Path, name: &Path) -> Option<Entry> {
-    regular::read_json(regular::open_below(out, &name.join(report::FILE)), LONGEST)
+    safe_open::read_json(safe_open::open_below(out, &name.join(result_files::REPORT)), LONGEST)
 }

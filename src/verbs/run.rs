@@ -2,15 +2,16 @@
 
 use super::{Exit, complain, shown};
 use crate::conveyor::Conveyor;
-use crate::hooks;
-use crate::inputs;
-use crate::job::{Done, End, Job};
+use crate::conveyor::completion::{Done, End};
+use crate::input;
+use crate::input::job::Job;
 use crate::outcome::Status;
-use crate::publish::Publisher;
+use crate::output::publish::Publisher;
 use crate::report::Report;
 use crate::settings::Settings;
-use crate::signals::{self, Hangup};
-use crate::watch::Stop;
+use crate::system::orphans;
+use crate::watch::signals::{self, Hangup};
+use crate::watch::stop::Stop;
 use comfy_table::{CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -27,9 +28,9 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// What makes the call as a whole impossible: wrong usage.
 pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
-    let jobs = inputs::collect(paths)?;
-    inputs::refuse_same_names(&jobs)?;
-    inputs::refuse_inside(&jobs, out)?;
+    let jobs = input::collect(paths)?;
+    input::refuse_same_names(&jobs)?;
+    input::refuse_inside(&jobs, out)?;
     let stop = signals::listen(Hangup::Stop, false)?;
     let publisher = Arc::new(Publisher::open(out)?);
     let conveyor = Conveyor::start(settings, publisher.clone(), false).map_err(|e| super::no_threads(&e))?;
@@ -40,7 +41,7 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
     // Where it was told twice to stop.
     let has_commands = !settings.on_certified.is_empty() || !settings.on_refused.is_empty();
     if has_commands && let Ok(staging) = publisher.staging() {
-        hooks::end_those_of(&staging);
+        orphans::end_those_of(&staging);
     }
     publisher.close();
     let rows: Vec<Row> = jobs.iter().map(AsRef::as_ref).zip(&ends).collect();
@@ -81,7 +82,7 @@ fn follow(jobs: &[Arc<Job>], conveyor: &Conveyor, stop: &Stop, quiet: bool) -> V
 
 /// What is on its way.
 fn message(conveyor: &Conveyor) -> String {
-    let one = |job: crate::conveyor::board::Running| {
+    let one = |job: crate::conveyor::progress::Running| {
         let charts = if job.charts > 1 { format!(" {}/{}", job.charts_done, job.charts) } else { String::new() };
         format!("{}: {}{charts}", shown(&job.name), job.stage.name())
     };

@@ -2,11 +2,11 @@
 
 use super::{Exit, say, say_json, shown};
 use crate::cli;
-use crate::health::{self, Health};
-use crate::ledger;
+use crate::operating::health::{self, Health};
+use crate::operating::status::{self, Counts, Noted, Progress, Refusal, Status};
 use crate::outcome::Status as Outcome;
+use crate::output::ledger;
 use crate::settings::Settings;
-use crate::status::{self, Counts, Noted, Progress, Refusal, Status};
 use serde::Serialize;
 use std::path::Path;
 

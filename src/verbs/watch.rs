@@ -1,17 +1,17 @@
 //! `planish watch`: the daemon.
 
 use super::{Exit, check_config, shown};
+use crate::after::holding;
 use crate::cli;
 use crate::conveyor::Conveyor;
-use crate::daemon::{Daemon, Source};
-use crate::disk::System;
-use crate::holding;
-use crate::hooks;
-use crate::places::{self, Place, PlaceError};
-use crate::publish::Publisher;
+use crate::operating::status::Lock;
+use crate::output::publish::Publisher;
 use crate::settings::{Inputs, Settings, SettingsError};
-use crate::signals::{self, Hangup};
-use crate::status::Lock;
+use crate::system::disk::System;
+use crate::system::folder_checks::{self, Place, PlaceError};
+use crate::system::orphans;
+use crate::watch::daemon::{Daemon, Source};
+use crate::watch::signals::{self, Hangup};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -50,7 +50,7 @@ pub fn watch(
     // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more, and no command
     // runs on.
     if let Ok(staging) = publisher.staging() {
-        hooks::end_those_of(&staging);
+        orphans::end_those_of(&staging);
     }
     publisher.close();
     tracing::info!(certified = ended.certified, refused = ended.refused, failed = ended.failed, "stopped");
@@ -67,9 +67,9 @@ pub(super) fn refuse_nested(inbox: &Path, out: &Path, settings: &Settings) -> Re
     let watched = Place::new("inbox", inbox);
     let mut all = vec![watched, Place::new("output folder", out)];
     all.extend(destinations(settings).map(|(role, folder)| Place::new(role, folder)));
-    places::refuse_nested(&all)?;
+    folder_checks::refuse_nested(&all)?;
     let metrics = settings.metrics.iter().map(|file| Place::new("file of metrics", file));
-    places::refuse_nested(&[watched].into_iter().chain(metrics).collect::<Vec<_>>())
+    folder_checks::refuse_nested(&[watched].into_iter().chain(metrics).collect::<Vec<_>>())
 }
 
 /// Refuses a file of metrics for which there is no folder.

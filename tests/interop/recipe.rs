@@ -2,9 +2,11 @@
 
 use super::{run, script, tools};
 use crate::support::{Out, fixture, planish, root};
-use planish::hooks::{self, Account, Chain, Hook, Occasion, Outcome, Target};
+use planish::after::hooks::{self, Account, Chain, Outcome, Target};
 use planish::report::mesh::MeshReport;
+use planish::result_files;
 use planish::settings::{CommandSaid, Said};
+use planish::settings::{Hook, Occasion};
 use std::path::Path;
 
 /// The settings file of the README's section "Drop a file, get a mesh".
@@ -89,7 +91,7 @@ fn a_mesh_that_is_not_faithful_is_told() {
     assert!(account.failure().is_some(), "{account:?}");
     let outcomes: Vec<Outcome> = account.commands.iter().map(|c| c.outcome).collect();
     assert_eq!(outcomes, [Outcome::Succeeded, Outcome::Failed]);
-    let text = std::fs::read_to_string(target.folder().join(hooks::FILE)).expect("written");
+    let text = std::fs::read_to_string(target.folder().join(result_files::HOOKS)).expect("written");
     assert!(text.contains("not faithful"), "{text}");
     assert_proven(&target);
 }
@@ -117,7 +119,7 @@ fn accounts_follow_the_published_schema_and_leave_the_proof_alone() {
         let account = ran(&commands, &target, &out);
         assert_eq!(account.commands[0].outcome, outcome);
         let schema = root().join("docs/hooks.schema.json");
-        let written = target.folder().join(hooks::FILE);
+        let written = target.folder().join(result_files::HOOKS);
         run(script("validate_schema.py").arg(schema).arg(written), "hooks.json breaks its schema");
     }
     assert_proven(&target);

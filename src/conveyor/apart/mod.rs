@@ -16,9 +16,9 @@ pub mod protocol;
 pub(super) mod stage;
 
 use super::budget::Account;
-use super::travel::Travel;
-use crate::begun::{self, Entry};
-use crate::job::Stage;
+use super::in_flight::Travel;
+use crate::conveyor::stage::Stage;
+use crate::output::begun::{self, Entry};
 use crate::report::ResultSettings;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use parking_lot::Mutex;

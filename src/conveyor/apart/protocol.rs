@@ -1,10 +1,10 @@
 //! What the process of a single job and its parent say to each other: a line of JSON each, on the job's standard input
 //! and output.
 
-use crate::begun::Entry;
+use crate::conveyor::stage::Stage;
 use crate::formats::Limits;
-use crate::job::Stage;
 use crate::outcome::Reason;
+use crate::output::begun::Entry;
 use crate::report::ResultSettings;
 use crate::settings::Settings;
 use serde::{Deserialize, Serialize};

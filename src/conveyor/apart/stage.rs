@@ -2,16 +2,18 @@
 
 use super::protocol::Ending;
 use super::{Death, Outcome, run};
-use crate::begun::MOST_DEATHS;
-use crate::conveyor::travel::Travel;
+use crate::conveyor::completion::End;
+use crate::conveyor::in_flight::Travel;
+use crate::conveyor::stage::Stage;
 use crate::conveyor::writing::{self, After, Made, Ready};
 use crate::conveyor::{Finished, hand_on, reading, unwritten};
-use crate::job::{End, Stage};
+use crate::input;
 use crate::outcome::{Code, Reason};
-use crate::passing;
-use crate::publish::{PublishError, Staged};
-use crate::report::{self, Report};
-use crate::stages;
+use crate::output::begun::MOST_DEATHS;
+use crate::output::publish::{PublishError, Staged};
+use crate::report::Report;
+use crate::result_files;
+use crate::system::passing;
 use blake3::Hash;
 use bytesize::ByteSize;
 use crossbeam_channel::Sender;
@@ -95,7 +97,7 @@ fn end(travel: &Arc<Travel>, ending: Ending, staged: Staged, hash: Hash, after: 
 
 /// Puts in place what the process of an input has made, if it is of the content that was hashed.
 fn put(travel: &Arc<Travel>, staged: Staged, hash: Hash, after: &After) {
-    let text = stages::read_file(&staged.folder().join(report::FILE)).ok();
+    let text = input::read_file(&staged.folder().join(result_files::REPORT)).ok();
     let report: Option<Report> = text.and_then(|text| serde_json::from_slice(&text).ok());
     match report {
         Some(report) if report.input.blake3.as_deref() == Some(hash.to_hex().as_str()) => {

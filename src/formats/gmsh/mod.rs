@@ -7,6 +7,7 @@ mod geo;
 mod mesh;
 mod read;
 
+pub use crate::result_files::{ATLAS_MSH as ATLAS, ENLARGED_MSH as ENLARGED, REMESH};
 pub use geo::{Algorithms, Narrow, Script, remesh};
 pub use read::{AtlasError, read as read_atlas};
 
@@ -16,15 +17,6 @@ use planish_core::seams::SeamNetwork;
 use planish_core::subdivide::{LinearAtlas, LinearChart};
 use planish_core::topology::ChartId;
 use planish_core::vec3::BoundingBox;
-
-/// The name of the atlas in a result folder, and in `remesh.geo`.
-pub const ATLAS: &str = "atlas.msh";
-
-/// The name of the atlas in a larger unit, which `remesh.geo` merges where Gmsh needs it.
-pub const ENLARGED: &str = "atlas-enlarged.msh";
-
-/// The name of the script.
-pub const REMESH: &str = "remesh.geo";
 
 /// The bytes of `atlas.msh`: MSH 4.1, binary, little endian.
 ///

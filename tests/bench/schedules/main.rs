@@ -10,7 +10,7 @@
 mod budget;
 #[allow(missing_docs)]
 mod sync;
-#[path = "../../../src/conveyor/turnstile.rs"]
+#[path = "../../../src/conveyor/semaphore.rs"]
 #[allow(dead_code, missing_docs)]
 mod turnstile;
 

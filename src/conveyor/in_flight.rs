@@ -1,0 +1,359 @@
+//! A job between the stages: what it has taken and must give back, whatever becomes of it.
+
+use super::budget::Account;
+use super::completion::{End, Ended};
+use super::grants::Grants;
+use super::progress::Board;
+use super::queue::{Queue, Turn, Waiting, belt};
+use super::stage::Stage;
+use super::writing::Sink;
+use crate::formats::{self, Kind};
+use crate::input::{self, job::Job};
+use crate::outcome::Stopped;
+use crate::output::begun::{Begun, Entry, Suspect};
+use crate::settings::Settings;
+use crate::stages::guard;
+use crate::system::escape::shown;
+use crate::system::vitals;
+use crossbeam_channel::Sender;
+use parking_lot::{Mutex, RwLock};
+use planish_core::monitor::Monitor;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use tracing::Span;
+
+/// What all threads share.
+pub(super) struct Shared {
+    /// Those of inputs that are taken up from now on.
+    pub settings: RwLock<Arc<Settings>>,
+    pub sink: Sink,
+    /// None in the process of a single job: its parent marks it.
+    pub begun: Option<Begun>,
+    /// Whether results are kept that cannot be written now.
+    pub is_patient: bool,
+    pub queue: Queue,
+    pub grants: Arc<dyn Grants>,
+    pub board: Board,
+    pub ended: Sender<Ended>,
+    /// Steps that work has taken: a sign of life.
+    pub steps: AtomicU64,
+    /// Processes that died of inputs.
+    pub deaths: AtomicU64,
+}
+
+impl Shared {
+    /// The settings as they are now.
+    pub fn settings(&self) -> Arc<Settings> {
+        self.settings.read().clone()
+    }
+
+    /// Work has taken a step.
+    pub fn step(&self) {
+        self.steps.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// A job on its way. When the last stage lets go of it, its memory is given back and its end is told: exactly once,
+/// even where a stage breaks down.
+pub(super) struct Travel {
+    pub shared: Arc<Shared>,
+    pub job: Arc<Job>,
+    pub number: u64,
+    /// The settings that were in force when it was taken up.
+    pub settings: Arc<Settings>,
+    /// Its place in the order of jobs.
+    pub turn: Turn,
+    suspect: Mutex<Option<Suspect>>,
+    /// What was foretold that it takes, in bytes.
+    foretold: u64,
+    memory: AtomicU64,
+    span: Span,
+    seconds: Mutex<BTreeMap<&'static str, f64>>,
+    end: Mutex<Option<End>>,
+}
+
+/// What an input takes from reading to writing, by its size and format. What is no mesh is only looked at.
+fn memory(job: &Job) -> u64 {
+    match formats::kind(&job.path) {
+        Kind::Mesh(format) => (job.bytes / format.bytes_per_triangle()).saturating_mul(input::MEMORY_PER_TRIANGLE),
+        Kind::OtherMesh(_) | Kind::NoMesh | Kind::Unknown(_) => job.bytes,
+    }
+}
+
+impl Travel {
+    /// Takes a job up, once there is memory for its data.
+    pub fn begin(shared: &Arc<Shared>, Waiting { job, turn }: Waiting) -> Arc<Self> {
+        let number = shared.board.add(&job);
+        let is_to_be_done = job.is_wanted() && job.doubted.is_none();
+        let foretold = if is_to_be_done { memory(&job) } else { 0 };
+        shared.grants.take(Account::Input(belt(job.bytes)), foretold, turn);
+        let span = tracing::info_span!("job", input = shown(&job.name));
+        let suspect = Mutex::new(span.in_scope(|| begin(shared, &job)));
+        let (settings, memory) = (shared.settings(), foretold.into());
+        let (shared, seconds, end) = (shared.clone(), Mutex::default(), Mutex::new(None));
+        Arc::new(Self { shared, job, number, settings, turn, suspect, foretold, memory, span, seconds, end })
+    }
+
+    /// What it takes from reading to writing, factors apart, as it was foretold by its size: in bytes.
+    pub fn foretold(&self) -> u64 {
+        self.foretold
+    }
+
+    /// How often a process has died while it was on its way.
+    pub fn deaths(&self) -> u32 {
+        self.suspect.lock().as_ref().map_or(0, Suspect::deaths)
+    }
+
+    /// Marks it as on its way in this process.
+    pub fn mark(&self) {
+        let marked = self.suspect.lock().as_mut().map_or(Ok(()), Suspect::begin);
+        if let Err(error) = marked {
+            self.span.in_scope(|| tracing::debug!("that it is on its way cannot be noted down: {error}"));
+        }
+    }
+
+    /// The mark for a process of its own: where, and what it says.
+    pub fn mark_apart(&self) -> Option<(PathBuf, Entry)> {
+        let suspect = self.suspect.lock();
+        let (path, entry) = suspect.as_ref()?.mark();
+        Some((path.to_owned(), entry.clone()))
+    }
+
+    /// One more process has died of it; how many that are.
+    pub fn count_death(&self) -> u32 {
+        self.shared.deaths.fetch_add(1, Ordering::Relaxed);
+        let mut suspect = self.suspect.lock();
+        // Only a process of its own has none, and that starts no other.
+        let Some(suspect) = suspect.as_mut() else { return u32::MAX };
+        if let Err(error) = suspect.count_death() {
+            self.span.in_scope(|| tracing::warn!("that a process died of it cannot be noted down: {error}"));
+        }
+        suspect.deaths()
+    }
+
+    /// It has come to its end, and nothing died of it.
+    pub fn acquit(&self) {
+        if let Some(suspect) = self.suspect.lock().as_mut().filter(|suspect| suspect.deaths() > 0) {
+            suspect.acquit();
+        }
+    }
+
+    /// Does the work of a stage: in its turn, its processor time booked. A panic is a failure of the job; what comes
+    /// out for a job that nobody wants any more is dropped.
+    pub fn compute<T>(
+        &self,
+        stage: Stage,
+        work: impl FnOnce(&dyn Monitor) -> Result<T, Stopped>,
+    ) -> Result<T, Stopped> {
+        self.reached(stage);
+        let seat = Seat::take(self);
+        let _in_stage = self.in_stage(stage);
+        let started = vitals::processor_of_this_thread();
+        let result = if self.job.is_wanted() { guard(|| work(&seat)) } else { Err(Stopped::Unwanted) };
+        *self.seconds.lock().entry(stage.name()).or_insert(0.0) +=
+            (vitals::processor_of_this_thread() - started).as_secs_f64();
+        if self.job.is_wanted() { result } else { Err(Stopped::Unwanted) }
+    }
+
+    /// Log messages until the end of what is returned are those of this job and stage.
+    pub fn in_stage(&self, stage: Stage) -> impl Drop {
+        self.span.in_scope(|| tracing::info_span!("stage", stage = stage.name())).entered()
+    }
+
+    /// Tells that the job has come so far.
+    pub fn reached(&self, stage: Stage) {
+        self.shared.step();
+        self.shared.board.update(self.number, |job| job.stage = job.stage.max(stage));
+    }
+
+    /// Tells how far a process of its own has come with it.
+    pub fn is_at(&self, stage: Stage, charts_done: usize, charts: usize) {
+        self.shared.board.update(self.number, |job| {
+            job.stage = job.stage.max(stage);
+            (job.charts_done, job.charts) = (charts_done, charts);
+        });
+    }
+
+    /// Tells what keeps it from going on.
+    pub fn is_in_trouble(&self, trouble: Option<String>) {
+        self.shared.board.update(self.number, |job| job.trouble = trouble);
+    }
+
+    /// The processor time of all stages so far. Milliseconds are enough, and read well.
+    pub fn timing(&self) -> BTreeMap<String, f64> {
+        let seconds = self.seconds.lock();
+        seconds.iter().map(|(stage, s)| ((*stage).to_owned(), (s * 1e3).round() / 1e3)).collect()
+    }
+
+    /// The data of the input is gone: others may take its memory.
+    pub fn give_memory_back(&self) {
+        self.shared.grants.give_back(Account::Input(belt(self.job.bytes)), self.memory.swap(0, Ordering::Relaxed));
+    }
+
+    /// How the job ended.
+    pub fn end(&self, end: End) {
+        *self.end.lock() = Some(end);
+    }
+}
+
+impl Drop for Travel {
+    fn drop(&mut self) {
+        self.give_memory_back();
+        self.shared.board.remove(self.number);
+        self.shared.step();
+        self.shared.queue.ended(&self.job);
+        let end = self.end.get_mut().take().unwrap_or(End::Lost);
+        // Fails only where nobody asks any more.
+        let _ = self.shared.ended.send(Ended { job: self.job.clone(), end });
+    }
+}
+
+/// Tells that a job begins; what is known of its input.
+fn begin(shared: &Shared, job: &Job) -> Option<Suspect> {
+    // The parent of a process of its own has done both.
+    let begun = shared.begun.as_ref().filter(|_| job.doubted.is_none())?;
+    tracing::info!("begins");
+    let staging = shared.sink.publisher()?.staging();
+    let staging = staging.inspect_err(|error| tracing::debug!("it cannot be marked as on its way: {error}")).ok()?;
+    Some(begun.about(&job.name, job.look, &staging))
+}
+
+/// A place inside the turnstile.
+struct Seat<'a>(&'a Travel);
+
+impl<'a> Seat<'a> {
+    fn take(travel: &'a Travel) -> Self {
+        travel.shared.grants.enter(travel.turn);
+        Self(travel)
+    }
+}
+
+impl Drop for Seat<'_> {
+    fn drop(&mut self) {
+        self.0.shared.grants.leave();
+    }
+}
+
+impl Monitor for Seat<'_> {
+    fn should_continue(&self) -> bool {
+        let Travel { shared, turn, job, .. } = self.0;
+        shared.step();
+        if job.is_wanted() {
+            shared.grants.let_pass(*turn);
+        }
+        job.is_wanted()
+    }
+
+    fn reserve(&self, bytes: u64) {
+        let Travel { shared, turn, job, .. } = self.0;
+        if !job.is_wanted() {
+            shared.grants.overdraw(Account::Factor, bytes);
+        } else if !shared.grants.try_take(Account::Factor, bytes) {
+            tracing::debug!(bytes, "waits for memory");
+            shared.grants.leave();
+            shared.grants.take(Account::Factor, bytes, *turn);
+            shared.grants.enter(*turn);
+        }
+    }
+
+    fn release(&self, bytes: u64) {
+        self.0.shared.grants.give_back(Account::Factor, bytes);
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::conveyor::grants::Own;
+    use crate::outcome::Code;
+    use crate::output::publish::Publisher;
+    use crate::settings::Said;
+    use crossbeam_channel::{Receiver, bounded};
+
+    /// What threads share, with an output folder that goes with it.
+    pub fn shared(memory: u64) -> (Arc<Shared>, Receiver<Ended>, tempfile::TempDir) {
+        let out = tempfile::tempdir().expect("a folder");
+        let (ended, to_tell) = bounded(8);
+        let shared = Shared {
+            settings: RwLock::new(Arc::new(Said::default().check().expect("in range"))),
+            sink: Sink::Out(Arc::new(Publisher::open(out.path()).expect("opens"))),
+            begun: None,
+            is_patient: false,
+            queue: Queue::default(),
+            grants: Arc::new(Own::new(1, memory)),
+            board: Board::default(),
+            ended,
+            steps: AtomicU64::new(0),
+            deaths: AtomicU64::new(0),
+        };
+        (Arc::new(shared), to_tell, out)
+    }
+
+    pub fn begin(shared: &Arc<Shared>) -> Arc<Travel> {
+        let job = Arc::new(Job::new("a.stl".into(), "a.stl".into(), 100));
+        Travel::begin(shared, Waiting { job, turn: 1 })
+    }
+
+    #[test]
+    fn memory_goes_by_the_triangles_that_a_file_can_hold() {
+        let memory = |name: &str| memory(&Job::new(name.into(), name.into(), 1_000_000));
+        assert_eq!(["a.stl", "a.PLY", "a.txt"].map(memory), [30_000_000, 107_142_000, 1_000_000]);
+    }
+
+    #[test]
+    fn a_panic_is_a_failure_of_its_job_and_what_it_held_is_given_back() {
+        let (shared, ended, _out) = shared(1 << 20);
+        let travel = begin(&shared);
+        assert_eq!(shared.board.running().len(), 1);
+        let stopped = travel.compute(Stage::Map, |monitor| -> Result<(), Stopped> {
+            let _held = planish_core::monitor::Reserved::new(monitor, 1 << 19);
+            panic!("a fault, for the test");
+        });
+        assert!(matches!(stopped, Err(Stopped::For(reason)) if reason.code == Code::Internal));
+        // Place and memory are free again; and nobody told how the job ended.
+        assert_eq!(travel.compute(Stage::Map, |_| Ok(7)), Ok(7));
+        assert!(shared.grants.try_take(Account::Factor, 1 << 19));
+        drop(travel);
+        assert!(matches!(ended.try_recv().expect("told").end, End::Lost));
+        assert!(ended.try_recv().is_err() && shared.board.running().is_empty());
+        shared.grants.give_back(Account::Factor, 1 << 19);
+        assert!(shared.grants.try_take(Account::Input(0), 1 << 20), "the memory for its data, too");
+    }
+
+    #[test]
+    fn what_nobody_wants_is_not_computed_or_dropped() {
+        let (shared, ended, _out) = shared(1 << 20);
+        let travel = begin(&shared);
+        let stopped = travel.compute(Stage::Map, |monitor| {
+            assert!(monitor.should_continue());
+            travel.job.cancel();
+            assert!(!monitor.should_continue());
+            Ok(())
+        });
+        assert_eq!(stopped, Err(Stopped::Unwanted));
+        assert_eq!(travel.compute(Stage::Map, |_| -> Result<(), _> { unreachable!() }), Err(Stopped::Unwanted));
+        travel.end(End::Unwanted);
+        drop(travel);
+        assert!(matches!(ended.try_recv().expect("told").end, End::Unwanted));
+    }
+
+    /// A job that waits for memory has left the turnstile: who holds the memory can go on.
+    #[test]
+    fn who_waits_for_memory_does_not_keep_others_from_computing() {
+        let (shared, _ended, _out) = shared(1 << 20);
+        let travels = [begin(&shared), begin(&shared)];
+        let rounds = |travel: &Arc<Travel>| {
+            for _ in 0..200 {
+                let done = travel.compute(Stage::Map, |monitor| {
+                    let _held = planish_core::monitor::Reserved::new(monitor, 3 << 18);
+                    monitor.should_continue();
+                    Ok(())
+                });
+                assert_eq!(done, Ok(()));
+            }
+        };
+        std::thread::scope(|s| travels.each_ref().map(|t| s.spawn(|| rounds(t))).map(|t| t.join().expect("ends")));
+    }
+}

@@ -1,0 +1,3 @@
+//! What a mesher gets of a certified atlas: sizes, names, parts. How that is encoded is a matter of [`crate::formats`].
+
+pub mod gmsh;

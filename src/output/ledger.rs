@@ -1,0 +1,137 @@
+//! The ledger: which inputs are done. There is no other one than the published reports.
+
+use crate::input::{Folder as Beside, read_file};
+use crate::outcome::{Code, Reason, Status};
+use crate::report::{Input, Output, Report};
+use crate::result_files;
+use crate::system::disk::{Disk, File, Folder, System};
+use crate::system::safe_open::{self, OpenError};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use walkdir::{DirEntry, WalkDir};
+
+/// The report published in `folder`, if it is that of the same content, settings and version as `fresh`, of a file and
+/// those `beside` it, and its files are there, unharmed. A failure is none: another version may do better, or another
+/// day; but planish does not die twice of the same. Nor is a refusal for a limit, which may have been raised since.
+pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Beside) -> Option<Report> {
+    up_to_date_in(&System.open(folder).ok()?, fresh, beside)
+}
+
+/// As [`up_to_date`], in an open folder.
+pub fn up_to_date_in<F: Folder>(folder: &F, fresh: &Report, beside: &Beside) -> Option<Report> {
+    let text = folder.follow_file(result_files::REPORT).and_then(|file| safe_open::read(&file, u64::MAX));
+    let older: Report = serde_json::from_slice(&text.ok()?).ok()?;
+    let same = Input { beside: vec![], ..older.input.clone() } == fresh.input
+        && fresh.input.blake3.is_some()
+        // The same content names the same files beside it.
+        && older.input.beside.iter().all(|read| beside.still_has(read))
+        && older.settings == fresh.settings
+        && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
+        && is_final(&older);
+    let there = |o: &Output| holds_in(folder, o).is_ok_and(|it_does| it_does);
+    let complete = (older.status == Status::Certified) != older.outputs.is_empty();
+    (same && complete && older.outputs.iter().all(there)).then_some(older)
+}
+
+/// Whether doing the same input again would be in vain, as far as is known.
+pub fn is_final(report: &Report) -> bool {
+    match report.reason.as_ref().map(|reason| reason.code) {
+        Some(Code::Crashed) => true,
+        Some(Code::TooLarge | Code::JobMemory | Code::JobTime) => false,
+        _ => report.status != Status::Failed,
+    }
+}
+
+/// Whether `folder` holds this file as it was published. One of another size is not read.
+///
+/// # Errors
+/// Why it cannot be read.
+pub fn holds(folder: &Path, output: &Output) -> Result<bool, OpenError> {
+    holds_in(&System.open(folder)?, output)
+}
+
+fn holds_in<F: Folder>(folder: &F, output: &Output) -> Result<bool, OpenError> {
+    let file = folder.follow_file(&output.file)?;
+    if file.stat()?.bytes != output.bytes {
+        return Ok(false);
+    }
+    match safe_open::read(&file, output.bytes) {
+        Ok(content) => Ok(Output::of(&output.file, &content) == *output),
+        Err(OpenError::TooLarge { .. }) => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// What a report says, in short.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Entry {
+    /// How the input ended.
+    pub status: Status,
+    /// Why, where it is not certified.
+    pub reason: Option<Reason>,
+}
+
+/// All results in the output folder `out`: their names and what their reports say, in the order of names.
+pub fn entries(out: &Path) -> impl Iterator<Item = (PathBuf, Entry)> {
+    let is_hidden = |e: &DirEntry| e.depth() > 0 && e.file_name().to_string_lossy().starts_with('.');
+    let mut folders = WalkDir::new(out).sort_by_file_name().into_iter();
+    let out = out.to_owned();
+    std::iter::from_fn(move || {
+        // Ends where the folder does.
+        loop {
+            let Ok(found) = folders.next()? else { continue };
+            if is_hidden(&found) && found.file_type().is_dir() {
+                folders.skip_current_dir();
+            } else if found.file_name() == result_files::REPORT && found.file_type().is_file() {
+                folders.skip_current_dir();
+                let entry = read_file(found.path()).ok().and_then(|text| serde_json::from_slice(&text).ok());
+                let name = found.path().parent().and_then(|p| p.strip_prefix(&out).ok()).map(Path::to_owned);
+                if let Some(pair) = name.zip(entry) {
+                    return Some(pair);
+                }
+            }
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_has_grown_is_not_read() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let output = Output::of("a.vtu", b"content");
+        assert!(holds(folder.path(), &output).is_err(), "it is missing");
+        std::fs::write(folder.path().join("a.vtu"), "content").expect("written");
+        assert!(holds(folder.path(), &output).expect("there"));
+        // No memory holds this.
+        let grown = std::fs::File::create(folder.path().join("a.vtu")).expect("made");
+        grown.set_len(1 << 42).expect("sparse");
+        assert!(!holds(folder.path(), &output).expect("there"));
+    }
+
+    #[test]
+    fn all_results_are_found_and_nothing_else() {
+        let out = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| {
+            let folder = out.path().join(name);
+            std::fs::create_dir_all(&folder).expect("made");
+            std::fs::write(folder.join(result_files::REPORT), text).expect("written");
+        };
+        write("b.stl", r#"{"status": "certified", "reason": null, "more": [1]}"#);
+        let reason = r#"{"code": "empty_file", "message": "m", "where": null}"#;
+        write("a/c.stl", &format!(r#"{{"status": "refused", "reason": {reason}}}"#));
+        write(".planish/run-1/d.stl", r#"{"status": "certified", "reason": null}"#);
+        write("broken.stl", "{");
+        #[cfg(unix)]
+        {
+            use rustix::fs::{CWD, FileType, Mode, mknodat};
+            let pipe = out.path().join("pipe.stl");
+            std::fs::create_dir(&pipe).expect("made");
+            mknodat(CWD, pipe.join(result_files::REPORT), FileType::Fifo, Mode::RUSR, 0).expect("made");
+        }
+        let found: Vec<_> = entries(out.path()).map(|(name, e)| (name.display().to_string(), e.status)).collect();
+        assert_eq!(found, [("a/c.stl".to_owned(), Status::Refused), ("b.stl".to_owned(), Status::Certified)]);
+    }
+}

@@ -1,0 +1,87 @@
+//! Commands that follow a result, checked: `[[on_certified]]` and `[[on_refused]]` of planish.toml.
+
+use super::CommandSaid;
+use super::template::{Template, TemplateError};
+
+/// When commands run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Occasion {
+    /// An input is certified.
+    Certified,
+    /// An input is refused, or failed.
+    Refused,
+}
+
+/// As the tables of planish.toml are named.
+impl std::fmt::Display for Occasion {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Certified => "on_certified",
+            Self::Refused => "on_refused",
+        })
+    }
+}
+
+/// A command, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hook {
+    configured: CommandSaid,
+    arguments: Vec<Template>,
+}
+
+/// Why a command is refused: wrong usage.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum HookRefused {
+    /// There is no program.
+    #[error("command names no program; give a list of program and arguments, as in [\"gmsh\", \"{{remesh}}\", \"-2\"]")]
+    Empty,
+    /// An argument is wrong.
+    #[error("command, part {part} ({text:?}): {error}")]
+    Argument {
+        /// Which, from 1; 1 is the program.
+        part: usize,
+        /// The argument.
+        text: String,
+        /// Why.
+        error: TemplateError,
+    },
+    /// The program is looked for in a folder that depends on the result.
+    #[error("command begins with the relative path {0:?}; give the full path, or a name alone to be found on the PATH")]
+    RelativeProgram(String),
+    /// The time limit is none.
+    #[error("time-limit is {0}; it must be a positive number of seconds")]
+    TimeLimit(f64),
+}
+
+impl Hook {
+    /// Checks a command for this occasion.
+    ///
+    /// # Errors
+    /// [`HookRefused`] for what can never run.
+    pub fn new(configured: CommandSaid, occasion: Occasion) -> Result<Self, HookRefused> {
+        let CommandSaid { command, time_limit } = &configured;
+        if !(*time_limit > 0.0 && time_limit.is_finite()) {
+            return Err(HookRefused::TimeLimit(*time_limit));
+        }
+        let parse = |(i, text): (usize, &String)| {
+            let refused = |error| HookRefused::Argument { part: i + 1, text: text.clone(), error };
+            Template::parse(text, occasion).map_err(refused)
+        };
+        let arguments = command.iter().enumerate().map(parse).collect::<Result<Vec<_>, _>>()?;
+        match arguments.first() {
+            Some(program) if program.is_relative_path() => Err(HookRefused::RelativeProgram(command[0].clone())),
+            Some(program) if !program.is_empty() => Ok(Self { configured, arguments }),
+            _ => Err(HookRefused::Empty),
+        }
+    }
+
+    /// The command as it is configured.
+    pub fn configured(&self) -> &CommandSaid {
+        &self.configured
+    }
+
+    /// Program and arguments, with their placeholders.
+    pub fn arguments(&self) -> &[Template] {
+        &self.arguments
+    }
+}
