@@ -9,6 +9,7 @@ use super::complex::{Complex, NONE};
 use super::ldl::Springs;
 use super::voronoi::Graph;
 use crate::measure::distortion::quantiles;
+use crate::topology::csr::Csr;
 use crate::vec3::{Vec3, distance};
 use std::f64::consts::TAU;
 
@@ -17,14 +18,14 @@ use std::f64::consts::TAU;
 pub(super) struct CellGraph {
     centroids: Vec<Vec3>,
     areas: Vec<f64>,
-    starts: Vec<u32>,
-    links: Vec<Link>,
+    /// Per cell the cells beside it, ascending.
+    links: Csr<Link>,
     /// Per cell its place in an order that is good to eliminate cells in.
     rank: Vec<u32>,
 }
 
 /// A cell beside another one.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Link {
     to: u32,
     conductance: f64,
@@ -38,21 +39,20 @@ impl CellGraph {
         let centroids: Vec<Vec3> = complex.cells.iter().map(|c| c.centroid).collect();
         let areas = complex.cells.iter().map(|c| c.area).collect();
         let count = complex.cells.len();
-        let mut graph = Self { centroids, areas, starts: vec![0; count + 1], links: Vec::new(), rank: Vec::new() };
+        let mut graph = Self { centroids, areas, links: Csr::default(), rank: Vec::new() };
         let inner = complex.arcs.iter().filter(|a| a.twin != NONE);
         let mut pairs: Vec<(u32, u32, f64, f64)> =
             inner.map(|a| (a.cell, complex.arcs[a.twin as usize].cell, a.length, a.feature)).collect();
         pairs.sort_unstable_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)).then(x.2.total_cmp(&y.2)));
-        for run in pairs.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
+        let link = |run: &[(u32, u32, f64, f64)]| {
             let (a, b, ..) = run[0];
             let length: f64 = run.iter().map(|pair| pair.2).sum();
             let sharp: f64 = run.iter().map(|pair| pair.3).sum();
             let distance = graph.spacing(a, b);
-            let feature = 2.0 * sharp > length;
-            graph.links.push(Link { to: b, conductance: length / distance, distance, feature });
-            graph.starts[a as usize + 1] += 1;
-        }
-        (0..count).for_each(|c| graph.starts[c + 1] += graph.starts[c]);
+            (a, Link { to: b, conductance: length / distance, distance, feature: 2.0 * sharp > length })
+        };
+        let links: Vec<(u32, Link)> = pairs.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).map(link).collect();
+        graph.links = Csr::sorted(count, || links.iter().copied());
         graph.rank = graph.dissected();
         graph
     }
@@ -106,7 +106,7 @@ impl CellGraph {
     }
 
     fn links(&self, cell: u32) -> &[Link] {
-        &self.links[self.starts[cell as usize] as usize..self.starts[cell as usize + 1] as usize]
+        self.links.row(cell as usize)
     }
 
     pub(super) fn area(&self, cell: u32) -> f64 {

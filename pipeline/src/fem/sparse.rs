@@ -6,7 +6,7 @@
 //! doi 10.1137/S0895479894278952), or as they are numbered. General systems are solved by LU.
 
 use crate::monitor::{Interrupted, Monitor, Reserved};
-use crate::topology::csr::Buckets;
+use crate::topology::csr::Csr;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::prelude::Solve;
@@ -64,11 +64,11 @@ impl Pattern {
     pub fn new<const N: usize>(unknowns: usize, elements: &[[u32; N]]) -> Self {
         let all = || elements.iter().flat_map(entries);
         let of_columns = || all().zip(0_u32..).filter(|(e, _)| e.0 != PRESCRIBED);
-        let mut columns = Buckets::new(unknowns, || of_columns().map(|((row, column), i)| (column, (row, i))));
+        let mut columns = Csr::sorted(unknowns, || of_columns().map(|((row, column), i)| (column, (row, i))));
         let slots = vec![PRESCRIBED; elements.len() * N * (N + 1) / 2];
         let mut pattern = Self { unknowns, starts: vec![0], rows: Vec::new(), slots };
         for j in 0..unknowns {
-            let column = columns.get_mut(j);
+            let column = columns.row_mut(j);
             column.sort_unstable();
             for run in column.chunk_by(|a, b| a.0 == b.0) {
                 run.iter().for_each(|(_, i)| pattern.slots[*i as usize] = pattern.rows.len() as u32);

@@ -7,7 +7,7 @@ use crate::certify::CertifiedMap;
 use crate::fem::bernstein::{self, ExactDet};
 use crate::fem::element;
 use crate::grid::GridPoint;
-use crate::topology::Stars;
+use crate::topology::{Stars, VisitStamps};
 
 /// The fields of one triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,13 +122,15 @@ fn conformal_quantiles<const N: usize>(chart: &Chart, distortion: impl Fn(usize)
 fn star_scales(chart: &Chart, plane: &[f64]) -> Vec<(f64, f64)> {
     let stars = Stars::new(chart.triangles(), chart.vertices().len());
     let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
-    let (mut seen, mut seen_corner) = (vec![u32::MAX; space.len()], vec![u32::MAX; chart.vertices().len()]);
+    let mut seen_faces = VisitStamps::new(space.len());
+    let mut seen_corners = VisitStamps::new(chart.vertices().len());
     let mut two_rings = |v: usize| {
-        let new = |seen: &mut u32| std::mem::replace(seen, v as u32) != v as u32;
+        seen_faces.clear();
+        seen_corners.clear();
         let (mut in_plane, mut in_space) = (0.0, 0.0);
         let ring = stars.around(v).iter().flat_map(|f| chart.triangles()[*f as usize]);
-        for u in ring.filter(|u| new(&mut seen_corner[u.index()])) {
-            for f in stars.around(u.index()).iter().map(|f| *f as usize).filter(|f| new(&mut seen[*f])) {
+        for u in ring.filter(|u| seen_corners.visit(u.index())) {
+            for f in stars.around(u.index()).iter().map(|f| *f as usize).filter(|f| seen_faces.visit(*f)) {
                 in_plane += plane[f];
                 in_space += space[f];
             }
