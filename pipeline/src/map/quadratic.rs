@@ -6,7 +6,7 @@
 //! values; it need not be valid, and typically a few triangles in a thousand are not.
 
 use crate::fem::bernstein::{self, ExactDet, Validity};
-use crate::fem::element;
+use crate::fem::element::{self, Element, P2};
 use crate::fem::elimination;
 use crate::fem::jacobian::Corners;
 use crate::fem::sparse::{self, PRESCRIBED, Pattern};
@@ -101,7 +101,7 @@ fn solve(
     let mut values = pattern.zeros();
     let mut rhs = vec![0.0; 2 * unknowns];
     for f in faces {
-        let stiffness = element::stiffness(&chart.shapes()[f]);
+        let stiffness = P2::stiffness(&chart.shapes()[f]);
         pattern.add(&mut values, f, &stiffness);
         let nodes = chart.nodes(f);
         for (i, row) in elements[f].iter().enumerate().filter(|(_, r)| **r != PRESCRIBED) {
@@ -163,7 +163,7 @@ fn energy_of(chart: &ClosedChart, places: &[[f64; 2]]) -> f64 {
 
 /// The Dirichlet energy of every triangle of the closed chart; of `places`, only those of its nodes are used.
 pub(crate) fn energies(chart: &ClosedChart, places: &[[f64; 2]]) -> impl Iterator<Item = f64> {
-    let one = |f: usize| element::energy(&element::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| places[n]));
+    let one = |f: usize| element::energy(&P2::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| places[n]));
     (0..chart.triangles().len()).map(one)
 }
 

@@ -2,7 +2,7 @@
 
 use super::penalty::{Bound, Penalty, Value};
 use super::terms::{self, Form, Four};
-use crate::fem::element;
+use crate::fem::element::{self, Element, P2};
 use crate::fem::jacobian::{Corners, Six};
 use crate::fem::sparse::{Analysis, Error, PRESCRIBED, Pattern};
 use crate::map::closed::ClosedChart;
@@ -119,7 +119,7 @@ impl<'a> Problem<'a> {
         let mut total = 0.0;
         for (i, cell) in self.cells.iter().enumerate() {
             let six = self.six(i, x);
-            total += element::energy(&element::stiffness(&self.chart.shapes()[cell.face as usize]), &six);
+            total += element::energy(&P2::stiffness(&self.chart.shapes()[cell.face as usize]), &six);
             if let Some(bounds) = &cell.bounds {
                 let dets = Corners::new(&six).dets();
                 total += (0..6).map(|k| penalty.at(dets[k], &bounds[k]).value).sum::<f64>();
@@ -142,7 +142,7 @@ impl<'a> Problem<'a> {
         for (i, cell) in self.cells.iter().enumerate() {
             let six = self.six(i, x);
             let shape = &self.chart.shapes()[cell.face as usize];
-            let stiffness = element::stiffness(shape);
+            let stiffness = P2::stiffness(shape);
             let mut gradient = energy_gradient(&stiffness, &six);
             let mut form = Form::of_stiffness(stiffness);
             let mut outer = Vec::with_capacity(6);
