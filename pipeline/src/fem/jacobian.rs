@@ -1,7 +1,7 @@
 //! The jacobian determinant of a 6-node triangle in doubles: its Bernstein coefficients and their derivatives. What is
 //! decided is decided by [`crate::fem::bernstein`], exactly; this serves optimisation and figures.
 
-use crate::fem::element;
+use crate::fem::element::{Element, P2};
 use std::sync::LazyLock;
 
 /// Values at six nodes.
@@ -9,7 +9,7 @@ pub(crate) type Six = [[f64; 2]; 6];
 
 /// The derivatives of the basis along xi and eta at the three corners.
 pub(crate) static AT_CORNERS: LazyLock<[[[f64; 2]; 6]; 3]> =
-    LazyLock::new(|| [0, 1, 2].map(|k| element::gradients(element::NODES[k])));
+    LazyLock::new(|| [0, 1, 2].map(|k| P2::gradients(P2::NODES[k])));
 
 /// The pairs of corners behind the six Bernstein coefficients M_00, M_11, M_22, M_01, M_12, M_20.
 pub(crate) const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];

@@ -123,6 +123,16 @@ impl ClosedChart {
         if v.index() < self.own_vertices { v.index() } else { v.index() + self.own_edges }
     }
 
+    /// Per node, whether it lies on the outer loop, where nothing moves.
+    pub fn outer_nodes(&self) -> Vec<bool> {
+        let mut is_outer = vec![false; self.node_count()];
+        for h in &self.outer {
+            is_outer[self.vertex_node(self.ends(*h)[0])] = true;
+            is_outer[self.mid_node(*h)] = true;
+        }
+        is_outer
+    }
+
     /// The node at the centre of hole `k`.
     pub fn centre_node(&self, k: usize) -> usize {
         self.own_nodes() + k

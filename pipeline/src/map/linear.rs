@@ -10,7 +10,9 @@
 //!
 //! Guarantees: in a [`LinearMap`] every triangle, those of virtual fans included, turns left, exactly.
 
-use crate::fem::sparse::{self, Analysis, PRESCRIBED, Pattern};
+use crate::fem::assembly::Assembly;
+use crate::fem::dofs::Dofs;
+use crate::fem::sparse::{self, Analysis, Pattern};
 use crate::grid::{GridPoint, orientation};
 use crate::map::boundary::Boundary;
 use crate::map::closed::ClosedChart;
@@ -104,9 +106,10 @@ impl LinearMap {
 /// # Errors
 /// [`Error::Folded`] when the chart must be split; [`Error::Solver`].
 pub fn linear_map(chart: &ClosedChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<LinearMap, Error> {
-    let unknowns = Unknowns::new(chart, boundary);
-    let pattern = unknowns.pattern(chart);
-    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, monitor };
+    let dofs = dofs(chart);
+    let pattern = edge_pattern(chart, &dofs);
+    let analysis = pattern.analyse_as_numbered()?;
+    let system = System { chart, dofs: &dofs, prescribed: prescribed(chart, boundary), analysis, monitor };
     let harmonic = weights::harmonic(chart);
     let (places, mut folds) = attempt(&system, &harmonic)?;
     let count = folds.len();
@@ -170,9 +173,10 @@ pub fn harmonic_places(
     boundary: &Boundary,
     monitor: &dyn Monitor,
 ) -> Result<Vec<GridPoint>, Error> {
-    let unknowns = Unknowns::new(chart, boundary);
-    let pattern = unknowns.pattern(chart);
-    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, monitor };
+    let dofs = dofs(chart);
+    let pattern = edge_pattern(chart, &dofs);
+    let analysis = pattern.analyse_as_numbered()?;
+    let system = System { chart, dofs: &dofs, prescribed: prescribed(chart, boundary), analysis, monitor };
     Ok(system.solve(&weights::harmonic(chart))?)
 }
 
@@ -199,71 +203,46 @@ fn grow(chart: &ClosedChart, harmonic: &[f64], folds: &[FaceId], everywhere: boo
     grown
 }
 
-/// The unknowns of a linear map: vertices that are not on the outer loop, numbered in the order of elimination, and
-/// where those on it are.
-struct Unknowns {
-    number: Vec<u32>,
-    fixed: Vec<[f64; 2]>,
-    count: usize,
+/// The unknowns of a linear map: vertices that are not on the outer loop, in the order of elimination.
+fn dofs(chart: &ClosedChart) -> Dofs {
+    Dofs::new(chart.vertex_count(), chart.elimination().iter().map(|v| v.0).collect())
 }
 
-impl Unknowns {
-    fn new(chart: &ClosedChart, boundary: &Boundary) -> Self {
-        let mut number = vec![PRESCRIBED; chart.vertex_count()];
-        let mut fixed = vec![[0.0; 2]; chart.vertex_count()];
-        for (h, place) in chart.outer().iter().zip(boundary.vertices()) {
-            fixed[chart.ends(*h)[0].index()] = place.uv();
-        }
-        chart.elimination().iter().zip(0..).for_each(|(v, n)| number[v.index()] = n);
-        Self { number, fixed, count: chart.elimination().len() }
+/// Per vertex where `boundary` has it; the origin inside.
+fn prescribed(chart: &ClosedChart, boundary: &Boundary) -> Vec<[f64; 2]> {
+    let mut uv = vec![[0.0; 2]; chart.vertex_count()];
+    for (h, place) in chart.outer().iter().zip(boundary.vertices()) {
+        uv[chart.ends(*h)[0].index()] = place.uv();
     }
+    uv
+}
 
-    /// The pattern of one element per edge.
-    fn pattern(&self, chart: &ClosedChart) -> Pattern {
-        let element = |e: usize| edge_ends(chart, e).map(|v| self.number[v]);
-        Pattern::new(self.count, &(0..chart.edges().len()).map(element).collect::<Vec<_>>())
-    }
-
-    /// Adds `weight` times the places of prescribed neighbours to the right-hand side.
-    fn pull(&self, rhs: &mut [f64], unknown: u32, neighbour: usize, weight: f64) {
-        if unknown != PRESCRIBED && self.number[neighbour] == PRESCRIBED {
-            rhs[unknown as usize] += weight * self.fixed[neighbour][0];
-            rhs[self.count + unknown as usize] += weight * self.fixed[neighbour][1];
-        }
-    }
-
-    /// The places of all vertices, on the grid.
-    fn places(&self, solution: &[f64]) -> Vec<GridPoint> {
-        let free = |n: u32| [solution[n as usize], solution[self.count + n as usize]];
-        let uv = self.number.iter().zip(&self.fixed).map(|(n, f)| if *n == PRESCRIBED { *f } else { free(*n) });
-        uv.map(GridPoint::vertex).collect()
-    }
+/// The pattern of one element per edge.
+fn edge_pattern(chart: &ClosedChart, dofs: &Dofs) -> Pattern {
+    dofs.pattern((0..chart.edges().len()).map(|e| edge_ends(chart, e)))
 }
 
 /// The system for the places of the vertices by one weight per edge, analysed once for all weights.
 struct System<'a> {
     chart: &'a ClosedChart,
-    unknowns: &'a Unknowns,
+    dofs: &'a Dofs,
+    prescribed: Vec<[f64; 2]>,
     analysis: Analysis<'a>,
     monitor: &'a dyn Monitor,
 }
 
 impl System<'_> {
     fn solve(&self, weights: &[f64]) -> Result<Vec<GridPoint>, sparse::Error> {
-        let Self { chart, unknowns, analysis, monitor } = self;
-        let mut values = analysis.pattern().zeros();
-        let mut rhs = vec![0.0; 2 * unknowns.count];
+        let mut system = Assembly::new(self.dofs, self.analysis.pattern(), self.prescribed.clone());
         for (e, w) in weights.iter().enumerate() {
-            analysis.pattern().add(&mut values, e, &[[*w, -w], [-w, *w]]);
-            let [a, b] = edge_ends(chart, e);
-            unknowns.pull(&mut rhs, unknowns.number[a], b, *w);
-            unknowns.pull(&mut rhs, unknowns.number[b], a, *w);
+            system.add(e, &edge_ends(self.chart, e), &[[*w, -w], [-w, *w]]);
         }
-        if unknowns.count > 0 {
-            analysis.factorise(&values, *monitor)?.solve(&mut rhs, 2);
-        }
-        Ok(unknowns.places(&rhs))
+        Ok(on_grid(&system.solve(&self.analysis, self.monitor)?))
     }
+}
+
+fn on_grid(uv: &[[f64; 2]]) -> Vec<GridPoint> {
+    uv.iter().map(|p| GridPoint::vertex(*p)).collect()
 }
 
 /// The vertices at both ends of an edge.
@@ -278,28 +257,28 @@ fn solve_mean_value(
     weights: &[[f64; 2]],
     monitor: &dyn Monitor,
 ) -> Result<Vec<GridPoint>, Error> {
-    let unknowns = Unknowns::new(chart, boundary);
+    let dofs = dofs(chart);
+    let mut uv = prescribed(chart, boundary);
     let mut entries = Vec::new();
-    let mut rhs = vec![0.0; 2 * unknowns.count];
-    let mut row_sums = vec![0.0; unknowns.count];
+    let mut rhs = vec![0.0; 2 * dofs.count()];
+    let mut row_sums = vec![0.0; dofs.count()];
     for (e, sides) in chart.edges().iter() {
         let [a, b] = chart.ends(sides[0]).map(|v| v.index());
         for (from, to, w) in [(a, b, weights[e.index()][0]), (b, a, weights[e.index()][1])] {
-            let (row, column) = (unknowns.number[from], unknowns.number[to]);
-            unknowns.pull(&mut rhs, row, to, w);
-            if row != PRESCRIBED {
-                row_sums[row as usize] += w;
-            }
-            if row != PRESCRIBED && column != PRESCRIBED {
-                entries.push((row, column, -w));
+            let Some(row) = dofs.unknown(from) else { continue };
+            row_sums[row] += w;
+            match dofs.unknown(to) {
+                Some(column) => entries.push((row as u32, column as u32, -w)),
+                None => dofs.add_prescribed(&mut rhs, row, to, w, &uv),
             }
         }
     }
     entries.extend(row_sums.iter().enumerate().map(|(i, s)| (i as u32, i as u32, *s)));
-    if unknowns.count > 0 {
-        sparse::solve_general(unknowns.count, &entries, &mut rhs, 2, monitor)?;
+    if dofs.count() > 0 {
+        sparse::solve_general(dofs.count(), &entries, &mut rhs, 2, monitor)?;
+        dofs.scatter(&rhs, &mut uv);
     }
-    Ok(unknowns.places(&rhs))
+    Ok(on_grid(&uv))
 }
 
 /// Lowers mid-edge nodes of `boundary` where the raised map would come close to a folded corner: where a triangle

@@ -6,10 +6,12 @@
 //! values; it need not be valid, and typically a few triangles in a thousand are not.
 
 use crate::fem::bernstein::{self, ExactDet, Validity};
-use crate::fem::element;
+use crate::fem::dofs::Dofs;
+use crate::fem::element::{self, Element, P2};
 use crate::fem::elimination;
 use crate::fem::jacobian::Corners;
-use crate::fem::sparse::{self, PRESCRIBED, Pattern};
+use crate::fem::laplace;
+use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::map::boundary::Boundary;
 use crate::map::closed::ClosedChart;
@@ -58,64 +60,26 @@ pub fn quadratic_map(
     monitor: &dyn Monitor,
 ) -> Result<QuadraticMap, sparse::Error> {
     let checkpoint = Checkpoint::new(monitor);
-    let mut number = vec![0_u32; chart.node_count()];
-    let mut uv = vec![[0.0; 2]; chart.node_count()];
-    for (i, h) in chart.outer().iter().enumerate() {
-        let vertex = chart.vertex_node(chart.ends(*h)[0]);
-        for (node, place) in [(vertex, boundary.vertices()[i]), (chart.mid_node(*h), boundary.mids()[i])] {
-            number[node] = PRESCRIBED;
-            uv[node] = place.uv();
-        }
-    }
-    let mut unknowns = 0;
-    for node in elimination::of_nodes(chart) {
-        if number[node] != PRESCRIBED {
-            number[node] = unknowns;
-            unknowns += 1;
-        }
-    }
-    let solution = solve(chart, &number, &uv, unknowns as usize, &checkpoint)?;
-    for (node, n) in number.iter().enumerate().filter(|(_, n)| **n != PRESCRIBED) {
-        uv[node] = [solution[*n as usize], solution[(unknowns + n) as usize]];
-    }
+    let (dofs, prescribed) = prescribe(chart, boundary);
+    let stiffness = |face: usize| P2::stiffness(&chart.shapes()[face]);
+    let faces = chart.triangles().len();
+    let uv = laplace::harmonic(&dofs, faces, |f| chart.nodes(f), stiffness, prescribed, &checkpoint)?;
     let nodes = to_grid(chart, &uv);
-    checkpoint.after(chart.triangles().len())?;
+    checkpoint.after(faces)?;
     let invalid = invalid_triangles(chart, &nodes);
     // Of the solution itself: the grid ends not far outside the disk, and what was cut off there is no lower bound.
     let energy = energy_of(chart, &uv);
     Ok(QuadraticMap { places: uv, nodes, invalid, energy })
 }
 
-/// Solves both Laplace problems; returns the unknown values of u, then those of v.
-fn solve(
-    chart: &ClosedChart,
-    number: &[u32],
-    uv: &[[f64; 2]],
-    unknowns: usize,
-    checkpoint: &Checkpoint,
-) -> Result<Vec<f64>, sparse::Error> {
-    let faces = 0..chart.triangles().len();
-    let elements: Vec<[u32; 6]> = faces.clone().map(|f| chart.nodes(f).map(|n| number[n])).collect();
-    checkpoint.after(elements.len())?;
-    let pattern = Pattern::new(unknowns, &elements);
-    let mut values = pattern.zeros();
-    let mut rhs = vec![0.0; 2 * unknowns];
-    for f in faces {
-        let stiffness = element::stiffness(&chart.shapes()[f]);
-        pattern.add(&mut values, f, &stiffness);
-        let nodes = chart.nodes(f);
-        for (i, row) in elements[f].iter().enumerate().filter(|(_, r)| **r != PRESCRIBED) {
-            for j in (0..6).filter(|j| elements[f][*j] == PRESCRIBED) {
-                rhs[*row as usize] -= stiffness[i][j] * uv[nodes[j]][0];
-                rhs[unknowns + *row as usize] -= stiffness[i][j] * uv[nodes[j]][1];
-            }
-        }
+/// The unknowns, in the order of elimination: all nodes that are not on the outer loop. And the values of the others.
+fn prescribe(chart: &ClosedChart, boundary: &Boundary) -> (Dofs, Vec<[f64; 2]>) {
+    let mut uv = vec![[0.0; 2]; chart.node_count()];
+    for (i, h) in chart.outer().iter().enumerate() {
+        uv[chart.vertex_node(chart.ends(*h)[0])] = boundary.vertices()[i].uv();
+        uv[chart.mid_node(*h)] = boundary.mids()[i].uv();
     }
-    if unknowns > 0 {
-        checkpoint.after(elements.len())?;
-        pattern.analyse_as_numbered()?.factorise(&values, checkpoint.monitor)?.solve(&mut rhs, 2);
-    }
-    Ok(rhs)
+    (elimination::dofs_inside(chart), uv)
 }
 
 /// Rounds the nodes of a closed chart to the grid: vertices to that of vertices, all others to that of mid-edge
@@ -163,7 +127,7 @@ fn energy_of(chart: &ClosedChart, places: &[[f64; 2]]) -> f64 {
 
 /// The Dirichlet energy of every triangle of the closed chart; of `places`, only those of its nodes are used.
 pub(crate) fn energies(chart: &ClosedChart, places: &[[f64; 2]]) -> impl Iterator<Item = f64> {
-    let one = |f: usize| element::energy(&element::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| places[n]));
+    let one = |f: usize| element::energy(&P2::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| places[n]));
     (0..chart.triangles().len()).map(one)
 }
 

@@ -5,7 +5,7 @@
 use crate::atlas::Chart;
 use crate::certify::CertifiedMap;
 use crate::fem::bernstein::{self, ExactDet};
-use crate::fem::element;
+use crate::fem::element::{Barycentric, Element, P2};
 use crate::grid::GridPoint;
 use crate::topology::{Stars, VisitStamps};
 
@@ -70,8 +70,8 @@ fn conformal_distortion(chart: &Chart, face: usize, x: [[f64; 2]; 6]) -> f64 {
     let p = chart.shapes()[face].in_plane();
     let (length, shift, height) = (p[1][0], p[2][0], p[2][1]);
     let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
-    let at = |l: &[f64; 3]| {
-        let g = element::gradients(*l);
+    let at = |l: &Barycentric| {
+        let g = P2::gradients(*l);
         let along = |dir: usize, k: usize| (1..6).map(|n| g[n][dir] * d[n][k]).sum::<f64>();
         let (a, b) = ([along(0, 0), along(0, 1)], [along(1, 0), along(1, 1)]);
         let det = (a[0] * b[1] - a[1] * b[0]) / (length * height);
@@ -79,10 +79,8 @@ fn conformal_distortion(chart: &Chart, face: usize, x: [[f64; 2]; 6]) -> f64 {
         let second = [0, 1].map(|k| (b[k] - shift * first[k]) / height);
         singular_ratio(first, second, det)
     };
-    let largest = element::NODES
-        .iter()
-        .map(at)
-        .fold(1.0, |m, r| if r.is_finite() && r > 0.0 { f64::max(m, r) } else { f64::MAX });
+    let largest =
+        P2::NODES.iter().map(at).fold(1.0, |m, r| if r.is_finite() && r > 0.0 { f64::max(m, r) } else { f64::MAX });
     largest.clamp(1.0, f64::MAX)
 }
 

@@ -54,7 +54,7 @@ fn problem<'a>(chart: &'a ClosedChart, energies: &[f64], mean: f64, checkpoint: 
     let own = chart.own_triangles() as u32;
     let bounds = |face: u32| (face < own).then(|| [unset(energies[face as usize].max(1e-6 * mean)); 6]);
     let cells = (0..chart.triangles().len() as u32).map(|face| Cell { face, bounds: bounds(face) }).collect();
-    let fixed = region::fixed_nodes(chart);
+    let fixed = chart.outer_nodes();
     let centres = chart.node_count()..chart.node_count() + chart.loops().len();
     let free: Vec<u32> = (0..fixed.len()).filter(|n| !fixed[*n]).chain(centres).map(|n| n as u32).collect();
     Problem::new(chart, cells, region::arc_cells(chart, |_| true, unset(mean)), &free, checkpoint)

@@ -67,10 +67,10 @@ fn search(
         Penalty::Barrier => SAFE * problem.longest_step(x, direction),
         Penalty::Regularised { .. } => f64::INFINITY,
     };
-    let start: Vec<[f64; 2]> = problem.free.iter().map(|n| x[*n as usize]).collect();
+    let start: Vec<[f64; 2]> = problem.free().iter().map(|n| x[*n as usize]).collect();
     let mut t = limit.min(1.0);
     for _ in (0..HALVINGS).take_while(|_| problem.checkpoint().is_ok()) {
-        for (p, n) in start.iter().zip(&problem.free) {
+        for (p, n) in start.iter().zip(problem.free()) {
             let d = direction[*n as usize];
             x[*n as usize] = [p[0] + t * d[0], p[1] + t * d[1]];
         }
@@ -80,6 +80,6 @@ fn search(
         }
         t *= 0.5;
     }
-    problem.free.iter().zip(start).for_each(|(n, p)| x[*n as usize] = p);
+    problem.free().iter().zip(start).for_each(|(n, p)| x[*n as usize] = p);
     None
 }

@@ -116,7 +116,7 @@ impl<'a> Setting<'a> {
         };
         let density = (0..plane.len()).map(density).collect();
         let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-        Self { chart, stars, density, start: places(start, &centres), fixed: region::fixed_nodes(chart), checkpoint }
+        Self { chart, stars, density, start: places(start, &centres), fixed: chart.outer_nodes(), checkpoint }
     }
 
     /// Untangles one patch of the map `x` (all nodes and star centres), begun between `x` and the feasible start by
@@ -163,7 +163,7 @@ impl<'a> Setting<'a> {
             shares.extend((0..3).map(|k| (nodes[3 + k], 0.5 * (corner[k] + corner[(k + 1) % 3]))));
         }
         shares.sort_unstable_by_key(|s| s.0);
-        for local in &problem.free {
+        for local in problem.free() {
             let n = problem.nodes()[*local as usize] as usize;
             let found = shares.binary_search_by_key(&n, |s| s.0);
             let (share, to) = (found.map_or(0.0, |i| shares[i].1), self.start[n]);

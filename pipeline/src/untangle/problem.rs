@@ -2,7 +2,8 @@
 
 use super::penalty::{Bound, Penalty, Value};
 use super::terms::{self, Form, Four};
-use crate::fem::element;
+use crate::fem::dofs::Dofs;
+use crate::fem::element::{self, Element, P2};
 use crate::fem::jacobian::{Corners, Six};
 use crate::fem::sparse::{Analysis, Error, PRESCRIBED, Pattern};
 use crate::map::closed::ClosedChart;
@@ -37,10 +38,8 @@ pub(super) struct Problem<'a> {
     nodes: Vec<u32>,
     /// Per cell, its six nodes in the numbering of the region.
     of_cell: Vec<[u32; 6]>,
-    /// The nodes that may move, in the numbering of the region.
-    pub free: Vec<u32>,
-    /// Per node of the region, its place among `free`, or [`PRESCRIBED`].
-    number: Vec<u32>,
+    /// The nodes of the region that may move.
+    dofs: Dofs,
 }
 
 /// Slope and curvature of the objective at a point.
@@ -66,10 +65,8 @@ impl<'a> Problem<'a> {
         let local = |n: u32| nodes.partition_point(|m| *m < n) as u32;
         let of_cell = cells.iter().map(|c| six(c).map(local)).collect();
         arcs.iter_mut().for_each(|a| a.nodes = a.nodes.map(local));
-        let free: Vec<u32> = free.iter().map(|n| local(*n)).collect();
-        let mut number = vec![PRESCRIBED; nodes.len()];
-        free.iter().enumerate().for_each(|(i, n)| number[*n as usize] = i as u32);
-        Self { chart, checkpoint, cells, arcs, nodes, of_cell, free, number }
+        let dofs = Dofs::new(nodes.len(), free.iter().map(|n| local(*n)).collect());
+        Self { chart, checkpoint, cells, arcs, nodes, of_cell, dofs }
     }
 
     /// A safe point, after all triangles of the region were looked at.
@@ -87,31 +84,33 @@ impl<'a> Problem<'a> {
         self.nodes.iter().map(|n| all[*n as usize]).collect()
     }
 
+    /// The nodes that may move, in the numbering of the region.
+    pub fn free(&self) -> &[u32] {
+        self.dofs.free()
+    }
+
     /// The nodes that may move, as numbered in the chart, each with its place in `x`.
     pub fn moved<'x>(&self, x: &'x Places) -> impl Iterator<Item = (usize, &'x [f64; 2])> {
-        self.free.iter().map(|n| (self.nodes[*n as usize] as usize, &x[*n as usize]))
+        self.free().iter().map(|n| (self.nodes[*n as usize] as usize, &x[*n as usize]))
     }
 
     /// The number of scalar unknowns: two per free node.
     pub fn unknowns(&self) -> usize {
-        2 * self.free.len()
+        2 * self.dofs.count()
     }
 
     /// The pattern of the Hessian: first the triangles, then the arcs (padded to the same size).
     pub fn pattern(&self) -> Pattern {
-        let pair = |n: usize| match self.number[n] {
-            PRESCRIBED => [PRESCRIBED; 2],
-            i => [2 * i, 2 * i + 1],
-        };
-        let mut elements: Vec<[u32; 12]> = Vec::with_capacity(self.cells.len() + self.arcs.len());
-        for nodes in &self.of_cell {
-            elements.push(std::array::from_fn(|i| pair(nodes[i / 2] as usize)[i % 2]));
-        }
-        for arc in &self.arcs {
-            elements
-                .push(std::array::from_fn(|i| arc.nodes.get(i / 2).map_or(PRESCRIBED, |n| pair(*n as usize)[i % 2])));
-        }
+        let of_cells = self.of_cell.iter().map(|nodes| self.components(nodes));
+        let of_arcs = self.arcs.iter().map(|arc| self.components(&arc.nodes));
+        let elements: Vec<[u32; 12]> = of_cells.chain(of_arcs).collect();
         Pattern::new(self.unknowns(), &elements)
+    }
+
+    /// The scalar unknowns of up to six nodes, padded with [`PRESCRIBED`].
+    fn components(&self, nodes: &[u32]) -> [u32; 12] {
+        let component = |i: usize| nodes.get(i / 2).map_or(PRESCRIBED, |n| self.dofs.component(*n as usize, i % 2));
+        std::array::from_fn(component)
     }
 
     /// The energy of the region plus all penalties.
@@ -119,7 +118,7 @@ impl<'a> Problem<'a> {
         let mut total = 0.0;
         for (i, cell) in self.cells.iter().enumerate() {
             let six = self.six(i, x);
-            total += element::energy(&element::stiffness(&self.chart.shapes()[cell.face as usize]), &six);
+            total += element::energy(&P2::stiffness(&self.chart.shapes()[cell.face as usize]), &six);
             if let Some(bounds) = &cell.bounds {
                 let dets = Corners::new(&six).dets();
                 total += (0..6).map(|k| penalty.at(dets[k], &bounds[k]).value).sum::<f64>();
@@ -142,7 +141,7 @@ impl<'a> Problem<'a> {
         for (i, cell) in self.cells.iter().enumerate() {
             let six = self.six(i, x);
             let shape = &self.chart.shapes()[cell.face as usize];
-            let stiffness = element::stiffness(shape);
+            let stiffness = P2::stiffness(shape);
             let mut gradient = energy_gradient(&stiffness, &six);
             let mut form = Form::of_stiffness(stiffness);
             let mut outer = Vec::with_capacity(6);
@@ -174,18 +173,17 @@ impl<'a> Problem<'a> {
 
     fn scatter(&self, gradient: &mut [f64], nodes: &[u32], element: &[f64; 12]) {
         for (i, n) in nodes.iter().enumerate() {
-            let number = self.number[*n as usize];
-            if number != PRESCRIBED {
-                gradient[2 * number as usize] += element[2 * i];
-                gradient[2 * number as usize + 1] += element[2 * i + 1];
+            if let Some(unknown) = self.dofs.unknown(*n as usize) {
+                gradient[2 * unknown] += element[2 * i];
+                gradient[2 * unknown + 1] += element[2 * i + 1];
             }
         }
     }
 
     /// The direction that belongs to a step of the unknowns: zero at nodes that may not move.
     pub fn direction(&self, step: &[f64]) -> Places {
-        let mut direction = vec![[0.0; 2]; self.number.len()];
-        for (i, n) in self.free.iter().enumerate() {
+        let mut direction = vec![[0.0; 2]; self.dofs.nodes()];
+        for (i, n) in self.free().iter().enumerate() {
             direction[*n as usize] = [step[2 * i], step[2 * i + 1]];
         }
         direction

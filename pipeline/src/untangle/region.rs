@@ -56,16 +56,6 @@ fn components(chart: &ClosedChart, faces: Vec<u32>) -> Vec<Vec<u32>> {
     keyed.chunk_by(|a, b| a.0 == b.0).map(|part| part.iter().map(|k| k.1).collect()).collect()
 }
 
-/// Per node of the closed chart, whether it lies on the outer loop, where nothing moves.
-pub(super) fn fixed_nodes(chart: &ClosedChart) -> Vec<bool> {
-    let mut fixed = vec![false; chart.node_count()];
-    for h in chart.outer() {
-        fixed[chart.vertex_node(chart.ends(*h)[0])] = true;
-        fixed[chart.mid_node(*h)] = true;
-    }
-    fixed
-}
-
 /// The nodes that may move when only `faces` (ascending) may change: all of their triangles are among them, and
 /// they are not `fixed`.
 pub(super) fn free_nodes(chart: &ClosedChart, stars: &Stars, fixed: &[bool], faces: &[u32]) -> Vec<u32> {
