@@ -3,14 +3,14 @@
 use crate::export::gmsh as hand_off;
 use crate::formats::{vtm, vtp, vtu};
 use crate::outcome::{Code, Reason, Status, Stopped};
-use crate::report::{self, Decomposition, Output, Report};
+use crate::report::{self, Decomposition, Output, RefusedComponent, Report};
 use crate::settings::{self, Settings};
 use planish_core::atlas::Atlas;
 use planish_core::fem::sparse;
 use planish_core::map::linear;
 use planish_core::mesh::{SurfaceMesh, TriangleSoup};
 use planish_core::monitor::{Monitor, NoMonitor};
-use planish_core::repair::{self, Repaired, repair};
+use planish_core::repair::{self, Accepted, Repaired, repair};
 use planish_core::{CertifiedAtlas, CertifiedChart, ChartError, ChartJob, MapError, MappedChart, Plan, decompose};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -46,12 +46,17 @@ fn not_repaired(error: &repair::Error) -> Reason {
     }
 }
 
-/// Whether an atlas can be made of a surface.
+/// The components of a surface of which no atlas can be made.
 ///
 /// # Errors
-/// The refusal of faces of volume elements.
-pub fn check_sheets(found: &Repaired) -> Result<(), Reason> {
-    found.check_sheets().map_err(|e| not_repaired(&e))
+/// The refusal, where there are no others.
+pub fn refused(found: &Repaired) -> Result<Vec<RefusedComponent>, Reason> {
+    Ok(found.refused().map_err(|e| not_repaired(&e))?.iter().map(refusal).collect())
+}
+
+fn refusal(component: &repair::RefusedComponent) -> RefusedComponent {
+    let &repair::RefusedComponent { component, triangles, first_triangle, ref error } = component;
+    RefusedComponent { component, triangles, first_triangle, reason: not_repaired(error) }
 }
 
 /// Repairs a soup and cuts it into charts; completes the report.
@@ -71,8 +76,12 @@ pub fn plan(
     report.repairs = Some(report::repairs(&found.report));
     report.warnings = report::warnings(&found);
     report.warnings.iter().for_each(|w| tracing::warn!("{}", w.message));
-    check_sheets(&found)?;
-    let plan = Plan::new(found.mesh, &settings.core(), monitor).map_err(not_cut)?;
+    let Accepted { mesh, refused } = found.accepted().map_err(|e| not_repaired(&e))?;
+    report.refused_components = refused.iter().map(refusal).collect();
+    for component in &report.refused_components {
+        tracing::warn!("component {} is refused: {}", component.component, component.reason.message);
+    }
+    let plan = Plan::new(mesh, &settings.core(), monitor).map_err(not_cut)?;
     let Plan { feature_edges, ears_split, .. } = plan;
     report.decomposition = Some(Decomposition { feature_edges, ears_split, ..Decomposition::default() });
     Ok(plan)

@@ -120,6 +120,7 @@ fn not_too_large(files: Files, travel: &Travel) -> Result<Files, Reason> {
 fn refuse(report: &mut Report, reason: Reason) {
     report.status = reason.status();
     // What a stage that broke down left in it is not to be trusted, nor that of a result that is not written.
+    report.refused_components.clear();
     report.charts.clear();
     report.outputs.clear();
     report.hand_off = None;

@@ -6,6 +6,7 @@ use crate::fem::sparse;
 use crate::map::linear;
 use crate::measure::distortion::{self, CellFields, Summary};
 use crate::mesh::SurfaceMesh;
+use crate::repair::RefusedComponent;
 use crate::seams::SeamNetwork;
 use crate::topology::{ChartId, FaceId};
 use crate::untangle;
@@ -130,6 +131,7 @@ pub struct CertifiedAtlas {
     mesh: SurfaceMesh,
     charts: Vec<CertifiedChart>,
     seams: SeamNetwork,
+    refused: Vec<RefusedComponent>,
 }
 
 /// Why charts make no atlas of a surface.
@@ -184,7 +186,17 @@ impl CertifiedAtlas {
         }
         let spacing = NARROW * size.unwrap_or_else(|| mesh.default_size());
         let seams = SeamNetwork::new(&mesh, &charts, spacing);
-        Self { mesh, charts, seams }
+        Self { mesh, charts, seams, refused: vec![] }
+    }
+
+    /// The same, beside which these components were refused.
+    pub fn without(self, refused: Vec<RefusedComponent>) -> Self {
+        Self { refused, ..self }
+    }
+
+    /// The components of the input that are not part of the surface, as they cannot be processed.
+    pub fn refused(&self) -> &[RefusedComponent] {
+        &self.refused
     }
 
     /// The surface.

@@ -98,6 +98,24 @@ impl SurfaceMesh {
         }
     }
 
+    /// The surface of some faces, ascending, which hold all triangles around each of their edges.
+    pub(crate) fn restricted(&self, faces: &[FaceId]) -> Self {
+        let mut is_used = vec![false; self.points.len()];
+        faces.iter().flat_map(|f| self.triangles[f.index()]).for_each(|v| is_used[v.index()] = true);
+        let vertices: Vec<VertexId> = (0..is_used.len()).filter(|v| is_used[*v]).map(VertexId::at).collect();
+        let mut number = vec![VertexId(u32::MAX); self.points.len()];
+        vertices.iter().zip(0..).for_each(|(v, n)| number[v.index()] = VertexId(n));
+        let triangles = faces.iter().map(|f| self.triangles[f.index()].map(|v| number[v.index()])).collect();
+        let local = |f: FaceId| faces.binary_search(&f).ok().map(FaceId::at);
+        let metric = Metric {
+            shapes: faces.iter().map(|f| self.metric.shapes[f.index()]).collect(),
+            flagged: faces.iter().map(|f| self.metric.flagged[f.index()]).collect(),
+            mollified_by: self.metric.mollified_by,
+            scale: self.metric.scale,
+        };
+        Self::of_patch(triangles, self.edges.part(faces, local), metric, self.patch(&vertices, faces))
+    }
+
     /// A part as a surface of its own.
     pub(crate) fn of_patch(triangles: Vec<[VertexId; 3]>, edges: EdgeTable, metric: Metric, patch: Patch) -> Self {
         let Patch { points, welded, source, added_from, .. } = patch;

@@ -15,11 +15,12 @@ use crate::atlas::{CertifiedAtlas, GatherError};
 use crate::decompose::{self, Illegal, decompose, split_ears};
 use crate::mesh::{SurfaceMesh, TriangleSoup};
 use crate::monitor::{Interrupted, Monitor};
-use crate::repair::{self, repair};
+use crate::repair::{self, Accepted, repair};
 use crate::settings::Settings;
 pub use job::{ChartError, ChartJob, MapError, MappedChart, parametrize_chart};
 
-/// Repairs a soup, cuts it into charts, and maps these; each map is proven to be one-to-one.
+/// Repairs a soup, cuts it into charts, and maps these; each map is proven to be one-to-one. Components that cannot be
+/// processed are left out, and named ([`CertifiedAtlas::refused`]).
 ///
 /// ```
 /// use planish_core::monitor::NoMonitor;
@@ -33,9 +34,8 @@ pub use job::{ChartError, ChartJob, MapError, MappedChart, parametrize_chart};
 /// # Errors
 /// [`Error`].
 pub fn parametrize(soup: &TriangleSoup, settings: &Settings, monitor: &dyn Monitor) -> Result<CertifiedAtlas, Error> {
-    let repaired = repair(soup, &settings.repair)?;
-    repaired.check_sheets()?;
-    parametrize_surface(repaired.mesh, settings, monitor)
+    let Accepted { mesh, refused } = repair(soup, &settings.repair)?.accepted()?;
+    Ok(parametrize_surface(mesh, settings, monitor)?.without(refused))
 }
 
 /// As [`parametrize`], for a surface that is repaired already.
