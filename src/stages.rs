@@ -57,34 +57,32 @@ pub fn check_sheets(found: &Repaired) -> Result<(), Reason> {
     found.check_sheets().map_err(|e| not_repaired(&e))
 }
 
-/// Repairs a soup and cuts it into charts; completes the report.
+/// A surface that is cut into charts.
+pub struct Cut {
+    /// The surface; where ears were split, it has more vertices than before.
+    pub mesh: SurfaceMesh,
+    /// Its charts.
+    pub charts: Vec<Chart>,
+    /// What the report says of that.
+    pub decomposition: Decomposition,
+}
+
+/// Cuts a surface into charts.
 ///
 /// # Errors
-/// The refusal, or that the result is no longer wanted.
-pub fn cut(
-    soup: TriangleSoup,
-    settings: &Settings,
-    report: &mut Report,
-    monitor: &dyn Monitor,
-) -> Result<(SurfaceMesh, Vec<Chart>), Stopped> {
-    let found = repaired(&soup, settings)?;
-    // The surface is all that is needed from here on.
-    drop(soup);
-    report.surface = Some(report::surface(&found));
-    report.repairs = Some(report::repairs(&found.report));
-    report.warnings = report::warnings(&found);
-    report.warnings.iter().for_each(|w| tracing::warn!("{}", w.message));
+/// The refusal of faces of volume elements, or that the result is no longer wanted.
+pub fn cut(found: Repaired, settings: &Settings, monitor: &dyn Monitor) -> Result<Cut, Stopped> {
     check_sheets(&found)?;
     let atlas = planish_core::decompose(&found.mesh, &settings.decompose(), monitor).map_err(not_cut)?;
-    let feature_edges = atlas.feature_edges();
-    report.decomposition = Some(Decomposition { feature_edges, ..Decomposition::default() });
+    let decomposition = Decomposition { feature_edges: atlas.feature_edges(), ..Decomposition::default() };
     let without = split_ears(&found.mesh, &atlas, settings.decompose().max_triangles);
     Ok(match without.map_err(internal)? {
-        Some(done) => {
-            report.decomposition.iter_mut().for_each(|d| d.ears_split = done.split);
-            (done.mesh, done.atlas.into_charts())
-        }
-        None => (found.mesh, atlas.into_charts()),
+        Some(done) => Cut {
+            mesh: done.mesh,
+            charts: done.atlas.into_charts(),
+            decomposition: Decomposition { ears_split: done.split, ..decomposition },
+        },
+        None => Cut { mesh: found.mesh, charts: atlas.into_charts(), decomposition },
     })
 }
 

@@ -35,7 +35,7 @@ use crate::input::job::Job;
 use crate::outcome::{Status, Stopped};
 use crate::output::begun::Begun;
 use crate::output::publish::{PublishError, Publisher};
-use crate::report::Report;
+use crate::report::{Facts, Report, SurfaceFacts};
 use crate::settings::Settings;
 use crate::stages;
 use apart::parent::Parent;
@@ -248,7 +248,7 @@ fn survive(work: impl FnOnce()) {
 /// What decomposition gets.
 struct Soup {
     travel: Arc<Travel>,
-    report: Report,
+    facts: Facts,
     soup: TriangleSoup,
 }
 
@@ -271,7 +271,7 @@ enum Finished {
     /// All charts are in, or one stopped the job.
     Surface(Arc<Surface>),
     /// There are no charts.
-    Stopped(Arc<Travel>, Box<Report>, Stopped),
+    Stopped(Arc<Travel>, Box<Facts>, Stopped),
 }
 
 /// What the commands get: a result.
@@ -286,11 +286,21 @@ fn hand_on<T>(to: &Sender<T>, item: T) {
     let _ = to.send(item);
 }
 
-fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
-    match travel.compute(Stage::Decompose, |monitor| stages::cut(soup, &travel.settings, &mut report, monitor)) {
-        Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
-        Ok((mesh, parts)) => {
-            let surface = Surface::new(travel, mesh, parts.len(), report);
+fn cut(Soup { travel, mut facts, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
+    let cut = travel.compute(Stage::Decompose, |monitor| {
+        let found = stages::repaired(&soup, &travel.settings)?;
+        // The surface is all that is needed from here on.
+        drop(soup);
+        let surface = facts.surface.insert(SurfaceFacts::of(&found));
+        surface.warnings.iter().for_each(|warning| tracing::warn!("{}", warning.message));
+        let cut = stages::cut(found, &travel.settings, monitor)?;
+        surface.decomposition = Some(cut.decomposition);
+        Ok(cut)
+    });
+    match cut {
+        Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(facts), why)),
+        Ok(stages::Cut { mesh, charts: parts, .. }) => {
+            let surface = Surface::new(travel, mesh, parts.len(), facts);
             for (i, chart) in parts.into_iter().enumerate() {
                 hand_on(charts, Cut { surface: surface.clone(), place: (i, 0), chart });
             }

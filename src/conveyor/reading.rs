@@ -11,7 +11,7 @@ use crate::input::{self, Folder};
 use crate::outcome::{Code, Reason, Stopped};
 use crate::output::begun::MOST_DEATHS;
 use crate::output::ledger;
-use crate::report::{Input, Report};
+use crate::report::{Facts, Input, Report};
 use blake3::Hash;
 use crossbeam_channel::Sender;
 use std::sync::Arc;
@@ -79,17 +79,17 @@ fn read_here(travel: Arc<Travel>, next: &Next) {
         Err(reason) if reason.passes => return again(&travel, reason.reason),
         content => content.map_err(|refusal| refusal.reason),
     };
-    let mut report = Report::new(input(&travel.job, content.as_deref().ok()), &travel.settings);
+    let mut facts = Facts::new(input(&travel.job, content.as_deref().ok()));
     let folder = Folder::of_job(&travel.job);
     let decoded = travel.compute(Stage::Read, |_| {
         let bytes = content?;
-        report.input.blake3 = Some(blake3::hash(&bytes).to_hex().to_string());
-        match up_to_date(&travel, &report, &folder) {
+        facts.input.blake3 = Some(blake3::hash(&bytes).to_hex().to_string());
+        match up_to_date(&travel, &facts.input, &folder) {
             Some(older) => Ok(Err(older)),
             None => {
                 let content = input::decode(&travel.job.path, &bytes, &travel.settings, &folder);
                 let content = content.map_err(|refusal| {
-                    report.content = refusal.notes.map(|notes| *notes);
+                    facts.content = refusal.notes.map(|notes| *notes);
                     refusal.reason
                 })?;
                 input::check_memory(&content.soup, &travel.settings)?;
@@ -98,25 +98,25 @@ fn read_here(travel: Arc<Travel>, next: &Next) {
         }
     });
     travel.job.set_beside(folder.asked());
-    report.input.beside = folder.read();
+    facts.input.beside = folder.read();
     match decoded {
         Ok(Ok(Content { soup, notes })) => {
             warn_of_doubts(&travel, &notes);
-            report.content = Some(notes);
-            hand_on(&next.soups, Soup { travel, report, soup });
+            facts.content = Some(notes);
+            hand_on(&next.soups, Soup { travel, facts, soup });
         }
         Ok(Err(older)) => leave(travel.clone(), older, next),
         Err(Stopped::For(reason)) if reason.code == Code::MissingFile && travel.job.since.is_some() => {
             travel.end(End::Waiting(reason));
         }
-        Err(why) => hand_on(&next.finished, Finished::Stopped(travel, Box::new(report), why)),
+        Err(why) => hand_on(&next.finished, Finished::Stopped(travel, Box::new(facts), why)),
     }
 }
 
 /// The older result, where nothing is to be done.
-fn up_to_date(travel: &Travel, report: &Report, folder: &Folder) -> Option<Report> {
+fn up_to_date(travel: &Travel, input: &Input, folder: &Folder) -> Option<Report> {
     let publisher = travel.shared.sink.publisher().filter(|_| !travel.settings.force)?;
-    ledger::up_to_date(&publisher.target(&travel.job.name), report, folder)
+    ledger::up_to_date(&publisher.target(&travel.job.name), input, &travel.settings, folder)
 }
 
 /// An older result is up to date.
@@ -138,28 +138,28 @@ fn read_apart(travel: Arc<Travel>, next: &Next) {
     if !travel.job.is_unchanged() {
         return travel.end(End::Changed);
     }
-    let mut report = Report::new(input(&travel.job, None), &travel.settings);
+    let mut facts = Facts::new(input(&travel.job, None));
     let hash = match hashed {
         Ok((hash, bytes)) => {
-            report.input.bytes = Some(bytes);
-            report.input.blake3 = Some(hash.to_hex().to_string());
+            facts.input.bytes = Some(bytes);
+            facts.input.blake3 = Some(hash.to_hex().to_string());
             hash
         }
         Err(refusal) if refusal.passes => return again(&travel, refusal.reason),
-        Err(refusal) => return stop(travel, report, refusal.reason.into(), next),
+        Err(refusal) => return stop(travel, facts, refusal.reason.into(), next),
     };
-    if let Some(older) = up_to_date(&travel, &report, &Folder::of_job(&travel.job)) {
+    if let Some(older) = up_to_date(&travel, &facts.input, &Folder::of_job(&travel.job)) {
         return leave(travel, older, next);
     }
     if travel.deaths() >= MOST_DEATHS && !travel.settings.force {
         let reason = crashed(&format!("it was on its way when {} processes ended", travel.deaths()));
-        return stop(travel, report, reason.into(), next);
+        return stop(travel, facts, reason.into(), next);
     }
-    hand_on(&next.apart, Apart { travel, report, hash });
+    hand_on(&next.apart, Apart { travel, facts, hash });
 }
 
-fn stop(travel: Arc<Travel>, report: Report, why: Stopped, next: &Next) {
-    hand_on(&next.finished, Finished::Stopped(travel, Box::new(report), why));
+fn stop(travel: Arc<Travel>, facts: Facts, why: Stopped, next: &Next) {
+    hand_on(&next.finished, Finished::Stopped(travel, Box::new(facts), why));
 }
 
 /// Why an input of which planish has died is put aside.

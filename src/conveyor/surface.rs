@@ -2,7 +2,7 @@
 
 use super::in_flight::Travel;
 use crate::outcome::Stopped;
-use crate::report::Report;
+use crate::report::Facts;
 use parking_lot::Mutex;
 use planish_core::CertifiedChart;
 use planish_core::atlas::Chart;
@@ -23,7 +23,7 @@ pub(super) struct Surface {
 }
 
 struct Parts {
-    report: Report,
+    facts: Facts,
     missing: usize,
     done: BTreeMap<Place, Vec<(Chart, CertifiedChart)>>,
     stopped: Option<(Place, Stopped)>,
@@ -31,9 +31,9 @@ struct Parts {
 
 impl Surface {
     /// A surface of which no chart is mapped yet.
-    pub fn new(travel: Arc<Travel>, mesh: SurfaceMesh, whole: usize, report: Report) -> Arc<Self> {
+    pub fn new(travel: Arc<Travel>, mesh: SurfaceMesh, whole: usize, facts: Facts) -> Arc<Self> {
         travel.shared.board.update(travel.number, |job| job.charts = whole);
-        let parts = Parts { report, missing: whole, done: BTreeMap::new(), stopped: None };
+        let parts = Parts { facts, missing: whole, done: BTreeMap::new(), stopped: None };
         Arc::new(Self { travel, mesh, whole, parts: Mutex::new(parts) })
     }
 
@@ -64,11 +64,11 @@ impl Surface {
         parts.missing == 0
     }
 
-    /// The report so far and all charts in order, or why there are not all.
-    pub fn collect(&self) -> (Report, Result<Vec<(Chart, CertifiedChart)>, Stopped>) {
+    /// What is known so far, and all charts in order, or why there are not all.
+    pub fn collect(&self) -> (Facts, Result<Vec<(Chart, CertifiedChart)>, Stopped>) {
         let mut parts = self.parts.lock();
         let done = std::mem::take(&mut parts.done).into_values().flatten().collect();
-        (parts.report.clone(), parts.stopped.take().map_or(Ok(done), |(_, why)| Err(why)))
+        (parts.facts.clone(), parts.stopped.take().map_or(Ok(done), |(_, why)| Err(why)))
     }
 }
 
@@ -89,7 +89,7 @@ mod tests {
         for turn in 0..3 {
             let mesh = repair(&shapes::disk(2), &Default::default()).expect("a surface").mesh;
             let input = Input { name: "a.stl".to_owned(), bytes: None, blake3: None, beside: vec![] };
-            let surface = Surface::new(begin(&shared), mesh, 3, Report::new(input, &shared.settings()));
+            let surface = Surface::new(begin(&shared), mesh, 3, Facts::new(input));
             surface.expect(1);
             let mut order = places;
             order.rotate_left(turn);

@@ -67,24 +67,23 @@ pub(super) struct After {
 
 /// Puts the charts of a surface together, and puts its result in place.
 pub(super) fn write(finished: Finished, after: &After) {
-    let (travel, mut report, files) = match finished {
-        Finished::Stopped(travel, report, why) => (travel, *report, Err(why)),
+    let (travel, facts, files) = match finished {
+        Finished::Stopped(travel, facts, why) => (travel, *facts, Err(why)),
         Finished::Surface(surface) => {
-            let (mut report, done) = surface.collect();
+            let (facts, done) = surface.collect();
             let travel = surface.travel.clone();
             let assembled = travel.compute(Stage::Write, |_| {
-                Ok(stages::assemble(&surface.mesh, done?, surface.whole, &travel.settings, &mut report)?)
+                let mut report = facts.clone().report(&travel.settings);
+                let files = stages::assemble(&surface.mesh, done?, surface.whole, &travel.settings, &mut report)?;
+                Ok((report, not_too_large(files, &travel)?))
             });
-            (travel, report, assembled)
+            (travel, facts, assembled)
         }
     };
-    let mut files = match files.and_then(|files| Ok(not_too_large(files, &travel)?)) {
-        Ok(files) => files,
+    let (mut report, mut files) = match files {
+        Ok(made) => made,
         Err(Stopped::Unwanted) => return travel.end(End::Unwanted),
-        Err(Stopped::For(reason)) => {
-            refuse(&mut report, reason);
-            Files::new()
-        }
+        Err(Stopped::For(reason)) => (facts.stopped(&travel.settings, reason), Files::new()),
     };
     report.timing = travel.timing();
     match report.to_json() {
@@ -113,16 +112,6 @@ fn not_too_large(files: Files, travel: &Travel) -> Result<Files, Reason> {
              planish.toml"
         ),
     ))
-}
-
-/// The report of an input that is refused, or failed.
-fn refuse(report: &mut Report, reason: Reason) {
-    report.status = reason.status();
-    // What a stage that broke down left in it is not to be trusted, nor that of a result that is not written.
-    report.charts.clear();
-    report.outputs.clear();
-    report.hand_off = None;
-    report.reason = Some(reason);
 }
 
 /// Puts a result in place, or keeps it for later.

@@ -2,6 +2,7 @@
 //! grows.
 
 mod build;
+mod facts;
 pub mod mesh;
 mod warnings;
 
@@ -10,6 +11,7 @@ use crate::outcome::{Reason, Status};
 use crate::settings::{self, Settings};
 use crate::system::escape::printable_json;
 pub use build::{certificate, chart_checksum, chart_report, repairs, seams, surface};
+pub use facts::{Facts, SurfaceFacts};
 use planish_core::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,6 +19,9 @@ pub use warnings::{Doubt, Warning, warnings};
 
 /// The version of the schema.
 pub const SCHEMA: u32 = 1;
+
+/// The version of planish, as reports tell it.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The whole report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -444,7 +449,7 @@ impl Report {
     pub fn new(input: Input, settings: &Settings) -> Self {
         Self {
             schema: SCHEMA,
-            planish: env!("CARGO_PKG_VERSION").to_owned(),
+            planish: VERSION.to_owned(),
             input,
             settings: settings.into(),
             status: Status::Failed,

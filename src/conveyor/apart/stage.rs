@@ -11,7 +11,7 @@ use crate::input;
 use crate::outcome::{Code, Reason};
 use crate::output::begun::MOST_DEATHS;
 use crate::output::publish::{PublishError, Staged};
-use crate::report::Report;
+use crate::report::{Facts, Report};
 use crate::result_files;
 use crate::system::passing;
 use blake3::Hash;
@@ -22,7 +22,7 @@ use std::sync::Arc;
 /// What gets a process of its own.
 pub(in crate::conveyor) struct Apart {
     pub travel: Arc<Travel>,
-    pub report: Report,
+    pub facts: Facts,
     /// The hash of its content.
     pub hash: Hash,
 }
@@ -34,11 +34,7 @@ enum Tried {
 }
 
 /// Has an input done by a process of its own: once more, where that dies.
-pub(in crate::conveyor) fn do_apart(
-    Apart { travel, mut report, hash }: Apart,
-    finished: &Sender<Finished>,
-    after: &After,
-) {
+pub(in crate::conveyor) fn do_apart(Apart { travel, facts, hash }: Apart, finished: &Sender<Finished>, after: &After) {
     let ended = loop {
         match try_apart(&travel, hash, after) {
             // Ends: deaths are counted.
@@ -56,8 +52,7 @@ pub(in crate::conveyor) fn do_apart(
         Some(Tried::Died(death)) => reading::crashed(&death.to_string()),
         Some(Tried::Refused(reason)) => reason,
     };
-    report.timing = travel.timing();
-    hand_on(finished, Finished::Stopped(travel, Box::new(report), why.into()));
+    hand_on(finished, Finished::Stopped(travel, Box::new(facts), why.into()));
 }
 
 /// Has an input done by a process of its own; none: its end is told, or its result on its way.
