@@ -1,8 +1,8 @@
 //! What each stage does with an input: values in, values out. The threads are in [`crate::conveyor`].
 
-use crate::export::gmsh as hand_off;
+use crate::export;
 use crate::formats::{vtm, vtp, vtu};
-use crate::outcome::{Code, Reason, Status, Stopped};
+use crate::outcome::{Abort, Code, Reason, Status};
 use crate::report::{self, Decomposition, Output, Report};
 use crate::settings::{self, Settings};
 use planish_core::atlas::{Atlas, Chart};
@@ -71,7 +71,7 @@ pub struct Cut {
 ///
 /// # Errors
 /// The refusal of faces of volume elements, or that the result is no longer wanted.
-pub fn cut(found: Repaired, settings: &Settings, monitor: &dyn Monitor) -> Result<Cut, Stopped> {
+pub fn cut(found: Repaired, settings: &Settings, monitor: &dyn Monitor) -> Result<Cut, Abort> {
     check_sheets(&found)?;
     let atlas = planish_core::decompose(&found.mesh, &settings.decompose(), monitor).map_err(not_cut)?;
     let decomposition = Decomposition { feature_edges: atlas.feature_edges(), ..Decomposition::default() };
@@ -86,9 +86,9 @@ pub fn cut(found: Repaired, settings: &Settings, monitor: &dyn Monitor) -> Resul
     })
 }
 
-fn not_cut(error: decompose::Error) -> Stopped {
+fn not_cut(error: decompose::Error) -> Abort {
     match error {
-        decompose::Error::Interrupted(_) => Stopped::Unwanted,
+        decompose::Error::Interrupted(_) => Abort::Unwanted,
         fault @ decompose::Error::Illegal(_) => internal(fault).into(),
     }
 }
@@ -106,7 +106,7 @@ pub fn map(
     chart: Chart,
     settings: &Settings,
     monitor: &dyn Monitor,
-) -> Result<Vec<(Chart, MappedChart)>, Stopped> {
+) -> Result<Vec<(Chart, MappedChart)>, Abort> {
     map_or_split(mesh, chart, settings.order, &settings.decompose(), monitor).map_err(not_mapped)
 }
 
@@ -119,13 +119,13 @@ pub fn untangle(
     (chart, mapped): (Chart, MappedChart),
     settings: &Settings,
     monitor: &dyn Monitor,
-) -> Result<Vec<(Chart, CertifiedChart)>, Stopped> {
+) -> Result<Vec<(Chart, CertifiedChart)>, Abort> {
     finish_or_split(mesh, chart, mapped, settings.order, &settings.decompose(), monitor).map_err(not_mapped)
 }
 
-fn not_mapped(error: SplitError) -> Stopped {
+fn not_mapped(error: SplitError) -> Abort {
     let code = match &error {
-        SplitError::Interrupted(_) => return Stopped::Unwanted,
+        SplitError::Interrupted(_) => return Abort::Unwanted,
         SplitError::Map(MapError::Linear(linear::Error::Solver(sparse::Error::TooLarge { .. }))) => Code::TooLarge,
         SplitError::Map(_) => Code::NeedsSplit,
         SplitError::Split(_) => Code::Internal,
@@ -148,8 +148,8 @@ pub fn assemble(
     let (mut charts, done): (Vec<Chart>, Vec<CertifiedChart>) = done.into_iter().unzip();
     Atlas::renumber(&mut charts);
     report.decomposition.iter_mut().for_each(|d| d.charts_by_splitting = charts.len() - whole);
-    let size = settings.size.unwrap_or_else(|| hand_off::default_size(mesh));
-    let network = SeamNetwork::new(mesh, &charts, hand_off::NARROW * size);
+    let size = settings.size.unwrap_or_else(|| export::default_size(mesh));
+    let network = SeamNetwork::new(mesh, &charts, export::NARROW * size);
     let fields: Vec<_> = charts.iter().zip(&done).map(|(c, d)| distortion::fields(c, &d.certified)).collect();
     let mut distortions = Vec::with_capacity(charts.len());
     for ((chart, done), fields) in charts.iter().zip(&done).zip(&fields) {
@@ -160,8 +160,8 @@ pub fn assemble(
     }
     report.seams = report::seams(&network);
     let mut files = encode(mesh, &charts, &done, &fields, &network)?;
-    if settings.hand_off == settings::HandOff::Gmsh {
-        let handed = hand_off::gmsh(mesh, &charts, &done, &distortions, &network, size);
+    if settings.hand_off == settings::ExportTarget::Gmsh {
+        let handed = export::gmsh(mesh, &charts, &done, &distortions, &network, size);
         files.extend(handed.files);
         report.hand_off = Some(handed.report);
     }
@@ -175,7 +175,7 @@ pub fn assemble(
 ///
 /// # Errors
 /// The refusal, where a chart cannot be mapped.
-pub fn finish(found: &Repaired, atlas: Atlas, settings: &Settings, report: &mut Report) -> Result<Files, Stopped> {
+pub fn finish(found: &Repaired, atlas: Atlas, settings: &Settings, report: &mut Report) -> Result<Files, Abort> {
     report.surface = Some(report::surface(found));
     report.repairs = Some(report::repairs(&found.report));
     report.decomposition = Some(Decomposition::default());

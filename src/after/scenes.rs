@@ -5,7 +5,7 @@
 //! this does not hold: an older or newer result is whole at any time; in the end each input has one whole result, and its
 //! content is where it belongs; nothing of others has gone; nothing is left over; and all of that is on disk.
 
-use crate::after::archive::{Fate, Processed, Way, put_away};
+use crate::after::archive::{Fate, Processed, Way, archive};
 use crate::after::holding;
 use crate::input;
 use crate::outcome::Status;
@@ -13,10 +13,10 @@ use crate::output::ledger;
 use crate::output::publish::{Content, PublishError, Publisher};
 use crate::report::{Input, Output, Report};
 use crate::result_files;
-use crate::settings::{Said, Settings};
+use crate::settings::{RawSettings, Settings};
 use crate::system::disk::simulated::{Abilities, Left, Lies, Plan, Seen, Simulated};
 use crate::system::disk::{Disk, Kind, replace_file};
-use crate::system::fingerprint::Look;
+use crate::system::fingerprint::Fingerprint;
 use parking_lot::Mutex;
 use rustix::io::Errno;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,7 +35,7 @@ const TROUBLES: [Errno; 7] =
     [Errno::IO, Errno::STALE, Errno::MFILE, Errno::NOMEM, Errno::TIMEDOUT, Errno::NOSPC, Errno::XDEV];
 
 /// Those of every scene: to check them, the machine is looked at.
-static SETTINGS: LazyLock<Settings> = LazyLock::new(|| Said::default().check().expect("in range"));
+static SETTINGS: LazyLock<Settings> = LazyLock::new(|| RawSettings::default().check().expect("in range"));
 
 /// After so many operations, a process has begun: no single failure ends it any more.
 const STARTED: usize = 40;
@@ -219,9 +219,9 @@ fn process(disk: &Simulated, stage: &Stage, publisher: &Publisher<Simulated>, na
         Inputs::Move | Inputs::MoveFar => Way::To(&moved),
     };
     publisher.secure(name.as_ref()).map_err(|error| error.to_string())?;
-    let (look, hash) = (Look::of_stat(&seen), blake3::hash(&content));
+    let (look, hash) = (Fingerprint::of_stat(&seen), blake3::hash(&content));
     let input = Processed { inbox: IN.as_ref(), name: name.as_ref(), look: &look, hash };
-    match put_away(disk, &input, way).map_err(|error| error.to_string())? {
+    match archive(disk, &input, way).map_err(|error| error.to_string())? {
         Fate::Away | Fate::Nothing => Ok(()),
         fate => Err(format!("{fate:?}")),
     }

@@ -1,7 +1,7 @@
 //! The hand-off to Gmsh: `atlas.msh` and `remesh.geo`, with the edge length that the script asks for.
 
 use crate::formats::gmsh;
-use crate::report::HandOff;
+use crate::report::ExportReport;
 use planish_core::CertifiedChart;
 use planish_core::atlas::Chart;
 use planish_core::evaluate::Plane;
@@ -66,11 +66,11 @@ const SEARCHED: f64 = 0.1;
 
 /// The files of a hand-off, and the account of it.
 #[derive(Debug)]
-pub struct HandedOff {
+pub struct Export {
     /// Names and contents; none where the hand-off failed.
     pub files: Vec<(String, Vec<u8>)>,
     /// What the report says.
-    pub report: HandOff,
+    pub report: ExportReport,
 }
 
 /// Hands charts with their certified maps to Gmsh, for triangles with edges of length `size` (see
@@ -83,9 +83,9 @@ pub fn gmsh(
     distortions: &[Summary],
     network: &SeamNetwork,
     size: f64,
-) -> HandedOff {
+) -> Export {
     let shortest_seam_distance = network.shortest_distance(mesh);
-    let mut report = HandOff { size, shortest_seam_distance, ..HandOff::default() };
+    let mut report = ExportReport { size, shortest_seam_distance, ..ExportReport::default() };
     report.warning = shortest_seam_distance.filter(|d| size > 0.5 * d).map(|d| too_coarse(size, d));
     let natural = natural_maps(mesh, charts, distortions);
     let straight: Vec<_> = natural.iter().map(|n| n.as_ref().map(|n| &n.map)).collect();
@@ -94,7 +94,7 @@ pub fn gmsh(
         Err(error) => {
             let failure = failure(&error, mesh, charts);
             tracing::warn!("no hand-off to Gmsh: {failure}");
-            return HandedOff { files: vec![], report: HandOff { failure: Some(failure), ..report } };
+            return Export { files: vec![], report: ExportReport { failure: Some(failure), ..report } };
         }
     };
     let mut distortions = distortions.to_vec();
@@ -105,7 +105,7 @@ pub fn gmsh(
     let narrow = narrow(charts, network, &algorithms.adapted, size);
     let mut spikes = spikes(mesh, charts, linear.curvatures(), size);
     let narrow_curves = narrow.iter().map(|n| n.curves.len()).sum();
-    let mut report = HandOff { narrow_curves, spikes: spikes.len(), ..counted(report, &linear, &algorithms) };
+    let mut report = ExportReport { narrow_curves, spikes: spikes.len(), ..counted(report, &linear, &algorithms) };
     if spikes.len() > MOST_SPIKES {
         report.warning.get_or_insert_with(|| too_coarse_for_spikes(size, spikes.len()));
         spikes.truncate(MOST_SPIKES);
@@ -115,7 +115,7 @@ pub fn gmsh(
     }
     let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
     let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow, spikes };
-    HandedOff { files: files(charts, &linear, network, &script), report }
+    Export { files: files(charts, &linear, network, &script), report }
 }
 
 /// Maps with a boundary of their own for the charts whose maps stretch, where these do less.
@@ -259,8 +259,8 @@ fn files(
     files
 }
 
-fn counted(report: HandOff, linear: &LinearAtlas, algorithms: &gmsh::Algorithms) -> HandOff {
-    HandOff {
+fn counted(report: ExportReport, linear: &LinearAtlas, algorithms: &gmsh::Algorithms) -> ExportReport {
+    ExportReport {
         adapted_charts: algorithms.adapted.iter().map(|c| *c as u32).collect(),
         enlarged: algorithms.enlarged,
         sub_triangles: linear.triangle_count(),
@@ -321,7 +321,7 @@ fn failure(error: &subdivide::Error, mesh: &SurfaceMesh, charts: &[Chart]) -> St
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::Said;
+    use crate::settings::RawSettings;
 
     #[test]
     fn an_edge_length_is_advised_only_where_it_is_taken() {
@@ -330,7 +330,7 @@ mod tests {
             let advised = message.split_once("--size ").and_then(|(_, rest)| rest.split(' ').next());
             let size: Option<f64> = advised.map(|a| a.parse().expect("a number"));
             assert!(size.is_none_or(|s| s < 0.5 * distance), "{message}");
-            assert!(Said { size, ..Said::default() }.check().is_ok(), "{message}");
+            assert!(RawSettings { size, ..RawSettings::default() }.check().is_ok(), "{message}");
             assert_eq!(size.is_some(), distance > 1e-310, "{message}");
         }
     }

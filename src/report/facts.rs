@@ -66,7 +66,7 @@ impl Facts {
 mod tests {
     use super::*;
     use crate::outcome::{Code, Status};
-    use crate::settings::Said;
+    use crate::settings::RawSettings;
     use planish_core::{repair, shapes};
 
     fn facts() -> Facts {
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn a_refused_input_tells_what_is_known_of_it_and_nothing_of_a_result() {
-        let settings = Said::default().check().expect("in range");
+        let settings = RawSettings::default().check().expect("in range");
         for (code, status) in [(Code::TooLarge, Status::Refused), (Code::Internal, Status::Failed)] {
             let report = facts().stopped(&settings, Reason::new(code, "for the test"));
             assert_eq!((report.status, report.reason.expect("one").code), (status, code));
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn an_input_that_was_not_read_has_no_surface() {
-        let settings = Said::default().check().expect("in range");
+        let settings = RawSettings::default().check().expect("in range");
         let unread = Facts { surface: None, ..facts() };
         let report = unread.stopped(&settings, Reason::new(Code::Malformed, "for the test"));
         assert_eq!((report.surface, report.repairs, report.warnings.len()), (None, None, 0));

@@ -56,7 +56,7 @@ pub struct Report {
     /// The curves between charts.
     pub seams: Seams,
     /// The hand-off to a mesher; null where there was none to be made.
-    pub hand_off: Option<HandOff>,
+    pub hand_off: Option<ExportReport>,
     /// The other files of the result.
     pub outputs: Vec<Output>,
     /// CPU seconds per stage: the only part that differs from run to run.
@@ -93,7 +93,7 @@ pub struct ResultSettings {
     /// Largest number of triangles of a chart; null: any.
     pub max_triangles: Option<usize>,
     /// Mesher to which the result is handed.
-    pub hand_off: settings::HandOff,
+    pub hand_off: settings::ExportTarget,
     /// Edge length that was asked for; null for the default.
     pub size: Option<f64>,
 }
@@ -387,7 +387,7 @@ pub struct Seam {
 
 /// The hand-off to a mesher.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct HandOff {
+pub struct ExportReport {
     /// The edge length that it asks for.
     pub size: f64,
     /// Triangles of the linear triangulation.

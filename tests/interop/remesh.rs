@@ -3,7 +3,7 @@
 use super::{PYTHON, assert_vtk_agrees, run, script};
 use crate::support::{Ended, Out, fixture, planish, root};
 use planish::report::{Input, Report};
-use planish::settings::{Said, Settings};
+use planish::settings::{RawSettings, Settings};
 use planish::stages;
 use planish_core::decompose::assemble;
 use planish_core::mesh::TriangleSoup;
@@ -45,7 +45,7 @@ fn gmsh(folder: &Path, change: impl Fn(String) -> String) {
 }
 
 fn settings(size: Option<f64>) -> Settings {
-    Said { size, ..Said::default() }.check().expect("valid")
+    RawSettings { size, ..RawSettings::default() }.check().expect("valid")
 }
 
 /// Writes the result of a surface with one chart per label; a triangle is labelled by its centre.
