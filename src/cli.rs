@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::settings::{FeatureAngle, HandOff, Inputs, Log, Refused, Said, Settings, SettingsError};
+use crate::settings::{ExportTarget, FeatureAngle, Inputs, Log, RawSettings, Refused, Settings, SettingsError};
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -139,7 +139,7 @@ pub struct Making {
     pub order: Option<u8>,
     /// Meshers to which results are handed: gmsh writes atlas.msh and remesh.geo [default: gmsh]
     #[arg(long, value_enum, value_name = "MESHER")]
-    pub hand_off: Option<HandOff>,
+    pub hand_off: Option<ExportTarget>,
     /// Edge length of the mesh to be made, in the unit of the input [default: that of as many equilateral triangles
     /// of the same area, but at most 1/50 of the bounding box's diagonal]
     #[arg(long, value_name = "H")]
@@ -287,23 +287,23 @@ impl Verb {
         let (common, mut said) = match self {
             Self::Run(run) => (&run.common, run.making.said()),
             Self::Watch(watch) => (&watch.common, watch.said()),
-            Self::Check(check) => (&check.common, Said::default()),
-            Self::Info(info) => (&info.common, Said { weld: info.reading.weld, ..Said::default() }),
-            Self::Apart(apart) => (&apart.common, Said { log: Some(Log::Json), ..Said::default() }),
-            Self::Retry(retry) => (&retry.common, Said { out: retry.out.clone(), ..Said::default() }),
-            Self::Status(status) => (&status.common, Said { out: status.out.clone(), ..Said::default() }),
+            Self::Check(check) => (&check.common, RawSettings::default()),
+            Self::Info(info) => (&info.common, RawSettings { weld: info.reading.weld, ..RawSettings::default() }),
+            Self::Apart(apart) => (&apart.common, RawSettings { log: Some(Log::Json), ..RawSettings::default() }),
+            Self::Retry(retry) => (&retry.common, RawSettings { out: retry.out.clone(), ..RawSettings::default() }),
+            Self::Status(status) => (&status.common, RawSettings { out: status.out.clone(), ..RawSettings::default() }),
         };
         said.log = common.log.or(said.log);
         said.verbose = (common.verbose > 0).then_some(common.verbose);
         said.quiet = common.quiet.then_some(true);
-        let file = common.config.as_deref().map(Said::from_file).transpose()?;
+        let file = common.config.as_deref().map(RawSettings::from_file).transpose()?;
         said.or(file.unwrap_or_default()).check()
     }
 }
 
 impl Watch {
-    fn said(&self) -> Said {
-        Said {
+    fn said(&self) -> RawSettings {
+        RawSettings {
             poll: self.poll.then_some(true),
             recursive: self.recursive.then_some(true),
             drain: self.drain.then_some(true),
@@ -318,8 +318,8 @@ impl Watch {
 }
 
 impl Making {
-    fn said(&self) -> Said {
-        Said {
+    fn said(&self) -> RawSettings {
+        RawSettings {
             out: self.out.clone(),
             order: self.order,
             weld: self.reading.weld,
@@ -335,7 +335,7 @@ impl Making {
             memory: self.memory,
             job_memory: self.job_memory,
             job_time: self.job_time,
-            ..Said::default()
+            ..RawSettings::default()
         }
     }
 }

@@ -15,7 +15,7 @@ fn main() -> ExitCode {
     });
     ended
         .unwrap_or_else(|error| {
-            verbs::complain(&error.to_string());
+            verbs::eprint_line(&error.to_string());
             Exit::Usage
         })
         .into()

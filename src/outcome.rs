@@ -102,14 +102,14 @@ impl Reason {
 
 /// Why work on a job stopped.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Stopped {
+pub enum Abort {
     /// It is refused, or failed.
     For(Reason),
     /// Nobody wants the result any more.
     Unwanted,
 }
 
-impl From<Reason> for Stopped {
+impl From<Reason> for Abort {
     fn from(reason: Reason) -> Self {
         Self::For(reason)
     }

@@ -1,9 +1,11 @@
 //! What each stage does with an input: values in, values out. The threads are in [`crate::conveyor`].
 
-use crate::export::gmsh as hand_off;
+use crate::export;
 use crate::formats::{vtm, vtp, vtu};
-use crate::outcome::{Code, Reason, Status, Stopped};
-use crate::report::{self, Decomposition, Output, RefusedComponent, Report};
+use crate::outcome::{Abort, Code, Reason};
+use crate::report::{
+    self, CertifiedFacts, Decomposition, Facts, Input, Output, RefusedComponent, Report, SurfaceFacts,
+};
 use crate::settings::{self, Settings};
 use planish_core::atlas::Atlas;
 use planish_core::fem::sparse;
@@ -59,37 +61,27 @@ fn refusal(component: &repair::RefusedComponent) -> RefusedComponent {
     RefusedComponent { component, triangles, first_triangle, reason: not_repaired(error) }
 }
 
-/// Repairs a soup and cuts it into charts; completes the report.
+/// Cuts a surface into charts.
 ///
 /// # Errors
 /// The refusal, or that the result is no longer wanted.
 pub fn plan(
-    soup: TriangleSoup,
+    found: Repaired,
     settings: &Settings,
-    report: &mut Report,
     monitor: &dyn Monitor,
-) -> Result<Plan, Stopped> {
-    let found = repaired(&soup, settings)?;
-    // The surface is all that is needed from here on.
-    drop(soup);
-    report.surface = Some(report::surface(&found));
-    report.repairs = Some(report::repairs(&found.report));
-    report.warnings = report::warnings(&found);
-    report.warnings.iter().for_each(|w| tracing::warn!("{}", w.message));
+) -> Result<(Plan, Vec<RefusedComponent>), Abort> {
     let Accepted { mesh, refused } = found.accepted().map_err(|e| not_repaired(&e))?;
-    report.refused_components = refused.iter().map(refusal).collect();
-    for component in &report.refused_components {
+    let refused: Vec<RefusedComponent> = refused.iter().map(refusal).collect();
+    for component in &refused {
         tracing::warn!("component {} is refused: {}", component.component, component.reason.message);
     }
     let plan = Plan::new(mesh, &settings.core(), monitor).map_err(not_cut)?;
-    let Plan { feature_edges, ears_split, .. } = plan;
-    report.decomposition = Some(Decomposition { feature_edges, ears_split, ..Decomposition::default() });
-    Ok(plan)
+    Ok((plan, refused))
 }
 
-fn not_cut(error: decompose::Error) -> Stopped {
+fn not_cut(error: decompose::Error) -> Abort {
     match error {
-        decompose::Error::Interrupted(_) => Stopped::Unwanted,
+        decompose::Error::Interrupted(_) => Abort::Unwanted,
         fault @ decompose::Error::Illegal(_) => internal(fault).into(),
     }
 }
@@ -102,7 +94,7 @@ fn internal(fault: impl std::fmt::Display) -> Reason {
 ///
 /// # Errors
 /// The refusal of a chart that cannot be mapped, not even split, or that the result is no longer wanted.
-pub fn map(job: ChartJob, monitor: &dyn Monitor) -> Result<Vec<MappedChart>, Stopped> {
+pub fn map(job: ChartJob, monitor: &dyn Monitor) -> Result<Vec<MappedChart>, Abort> {
     job.map(monitor).map_err(not_mapped)
 }
 
@@ -110,13 +102,13 @@ pub fn map(job: ChartJob, monitor: &dyn Monitor) -> Result<Vec<MappedChart>, Sto
 ///
 /// # Errors
 /// As [`map`].
-pub fn untangle(mapped: MappedChart, monitor: &dyn Monitor) -> Result<Vec<CertifiedChart>, Stopped> {
+pub fn untangle(mapped: MappedChart, monitor: &dyn Monitor) -> Result<Vec<CertifiedChart>, Abort> {
     mapped.untangle(monitor).map_err(not_mapped)
 }
 
-fn not_mapped(error: ChartError) -> Stopped {
+fn not_mapped(error: ChartError) -> Abort {
     let code = match &error {
-        ChartError::Interrupted(_) => return Stopped::Unwanted,
+        ChartError::Interrupted(_) => return Abort::Unwanted,
         ChartError::Map(MapError::Linear(linear::Error::Solver(sparse::Error::TooLarge { .. }))) => Code::TooLarge,
         ChartError::Map(_) => Code::NeedsSplit,
         ChartError::Split(_) => Code::Internal,
@@ -124,8 +116,8 @@ fn not_mapped(error: ChartError) -> Stopped {
     Reason::new(code, error).into()
 }
 
-/// Puts the charts of a surface together, `whole` of which decomposition made; completes the report, and returns the
-/// files of the result.
+/// Puts the charts of a surface together, `whole` of which decomposition made; returns what is known of the atlas then, and
+/// the files of the result.
 ///
 /// # Errors
 /// Where the result cannot be encoded: a fault of planish.
@@ -134,34 +126,36 @@ pub fn assemble(
     charts: Vec<CertifiedChart>,
     whole: usize,
     settings: &Settings,
-    report: &mut Report,
-) -> Result<Files, Reason> {
-    report.decomposition.iter_mut().for_each(|d| d.charts_by_splitting = charts.len() - whole);
+) -> Result<(CertifiedFacts, Files), Reason> {
+    let charts_by_splitting = charts.len() - whole;
     let atlas = CertifiedAtlas::gather(mesh, charts, settings.size).map_err(internal)?;
     atlas.charts().iter().for_each(warn_if_unsolved);
-    report.charts = report::charts(&atlas);
-    report.seams = report::seams(atlas.seams());
     let mut files = encode(&atlas)?;
-    if settings.hand_off == settings::HandOff::Gmsh {
+    let mut hand_off = None;
+    if settings.hand_off == settings::ExportTarget::Gmsh {
         let size = settings.size.unwrap_or_else(|| atlas.mesh().default_size());
-        let handed = hand_off::gmsh(&atlas, size);
-        files.extend(handed.files);
-        report.hand_off = Some(handed.report);
+        let export = export::gmsh(&atlas, size);
+        files.extend(export.files);
+        hand_off = Some(export.report);
     }
-    report.status = Status::Certified;
-    report.outputs = files.iter().map(|(name, content)| Output::of(name, content)).collect();
-    Ok(files)
+    let facts = CertifiedFacts {
+        charts: report::charts(&atlas),
+        charts_by_splitting,
+        seams: report::seams(atlas.seams()),
+        hand_off,
+        outputs: files.iter().map(|(name, content)| Output::of(name, content)).collect(),
+    };
+    Ok((facts, files))
 }
 
-/// Maps the charts of an atlas that was made otherwise, and puts them together; returns the files of its result and
-/// completes the report.
+/// Maps the charts of an atlas that was made otherwise, and puts them together; returns the report and the files of its
+/// result.
 ///
 /// # Errors
 /// The refusal, where a chart cannot be mapped.
-pub fn finish(found: Repaired, atlas: Atlas, settings: &Settings, report: &mut Report) -> Result<Files, Stopped> {
-    report.surface = Some(report::surface(&found));
-    report.repairs = Some(report::repairs(&found.report));
-    report.decomposition = Some(Decomposition::default());
+pub fn finish(input: Input, found: Repaired, atlas: Atlas, settings: &Settings) -> Result<(Report, Files), Abort> {
+    let surface = SurfaceFacts { decomposition: Some(Decomposition::default()), ..SurfaceFacts::of(&found) };
+    let facts = Facts { surface: Some(surface), ..Facts::new(input) };
     let whole = atlas.charts().len();
     let of_charts = settings.core().of_charts();
     let mut done = Vec::new();
@@ -170,7 +164,8 @@ pub fn finish(found: Repaired, atlas: Atlas, settings: &Settings, report: &mut R
             done.extend(untangle(mapped, &NoMonitor)?);
         }
     }
-    Ok(assemble(found.mesh, done, whole, settings, report)?)
+    let (certified, files) = assemble(found.mesh, done, whole, settings)?;
+    Ok((facts.certified(settings, certified), files))
 }
 
 fn warn_if_unsolved(certified: &CertifiedChart) {

@@ -17,6 +17,7 @@ mod manifest;
 mod names;
 mod opening;
 mod packaging;
+mod rooms;
 mod run;
 mod schedules;
 mod support;

@@ -4,7 +4,7 @@
 use crate::corpus::{manifest, shared};
 use planish::formats::{Format, Kind, kind};
 use planish::input::{Folder, decode};
-use planish::settings::{Said, Settings};
+use planish::settings::{RawSettings, Settings};
 use planish_core::topology::Census;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -48,7 +48,7 @@ fn differences(row: &Row, found: &[(&'static str, String)]) -> Vec<String> {
 
 #[test]
 fn every_file_holds_what_its_manifest_says() {
-    let settings = Said::default().check().expect("in range");
+    let settings = RawSettings::default().check().expect("in range");
     let mut wrong = Vec::new();
     for (folder, least) in [("meshes", 28), ("malformed", 11)] {
         let Some(folder) = shared(folder) else { continue };

@@ -1,7 +1,7 @@
 //! What packagers get works: the unit, and the example of a settings file.
 
 use crate::support::{Out, fixture, root};
-use planish::settings::{Said, Settings};
+use planish::settings::{RawSettings, Settings};
 use std::process::{Command, Output};
 
 fn packaged(name: &str) -> String {
@@ -17,13 +17,13 @@ fn all_switched_on() -> String {
     packaged("planish.toml").lines().map(on).collect::<Vec<_>>().join("\n")
 }
 
-fn read(text: &str) -> Said {
+fn read(text: &str) -> RawSettings {
     toml::from_str(text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 #[test]
 fn the_example_names_every_setting() {
-    let unknown = toml::from_str::<Said>("no-such-setting = 1").expect_err("unknown").to_string();
+    let unknown = toml::from_str::<RawSettings>("no-such-setting = 1").expect_err("unknown").to_string();
     let (_, list) = unknown.split_once("expected one of ").expect("a list of settings");
     let settings: Vec<&str> = list.split('`').skip(1).step_by(2).collect();
     assert!(settings.contains(&"order") && settings.contains(&"on_certified"), "{unknown}");
@@ -35,7 +35,7 @@ fn the_example_names_every_setting() {
 
 #[test]
 fn the_example_works_as_it_is_and_switched_on_and_shows_the_defaults() {
-    let defaults = Said::default().check().expect("in range");
+    let defaults = RawSettings::default().check().expect("in range");
     let as_it_is = read(&packaged("planish.toml")).check().expect("in range");
     assert_eq!(as_it_is, defaults);
     let all = read(&all_switched_on()).check().expect("in range");

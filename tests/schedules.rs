@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 #[test]
-fn no_order_of_threads_makes_the_turnstile_or_the_budget_stand_still() {
+fn no_order_of_threads_makes_the_semaphore_or_the_budget_stand_still() {
     // `cargo test` has built it.
     let program = Path::new(env!("CARGO_BIN_EXE_planish")).with_file_name("examples").join("schedules");
     let ran = Command::new(program).arg("1000").output().expect("built");

@@ -9,7 +9,7 @@
 //! link, a pipe or a device.
 
 use crate::system::disk::{self, Disk, File, Folder, Stat};
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use crate::system::safe_open::OpenError;
 use rustix::process::geteuid;
 use std::ffi::{OsStr, OsString};
@@ -27,7 +27,7 @@ const PRIVATE: u32 = 0o700;
 #[derive(Debug, thiserror::Error)]
 #[error(
     "inputs cannot be put away, as nothing can be taken out of the inbox {}: {error}; let the user that planish runs \
-     as write to this folder, or leave inputs where they are (`--inputs keep`)", shown(.inbox)
+     as write to this folder, or leave inputs where they are (`--inputs keep`)", escape(.inbox)
 )]
 pub struct InboxError {
     /// The inbox.
@@ -130,7 +130,7 @@ impl<'a, F: Folder> Holding<'a, F> {
     /// Removes the folder. Where somebody gave its name to something else, or something is left in it, that stays.
     pub(crate) fn remove(&self) {
         if let Err(error) = self.folder.remove_folder(&self.name) {
-            tracing::debug!(folder = shown(self.name.as_ref()), %error, "a holding folder is left to the next start");
+            tracing::debug!(folder = escape(self.name.as_ref()), %error, "a holding folder is left to the next start");
         }
     }
 }
@@ -178,12 +178,12 @@ fn for_all_left<D: Disk>(disk: &D, top: &Path, recursive: bool, work: impl Fn(&D
         match work_on(disk, top, &path, &work) {
             Ok(true) => {}
             Ok(false) => tracing::warn!(
-                path = shown(&top.join(path)),
+                path = escape(&top.join(path)),
                 "left alone: it is named as what planish holds, but is not, or not only, what this user has held; look \
                  into it, and remove it"
             ),
             Err(error) => tracing::warn!(
-                path = shown(&top.join(path)),
+                path = escape(&top.join(path)),
                 "cannot give back or clear what was being put away: {error}; look into it"
             ),
         }

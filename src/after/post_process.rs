@@ -1,6 +1,6 @@
 //! What follows when a result stands: the commands run on it, and its input is put away.
 
-use crate::after::archive::{Fate, Processed, PutAwayError, Way, put_away};
+use crate::after::archive::{ArchiveError, Fate, Processed, Way, archive};
 use crate::after::hooks::{self, Chain, HookError, Target};
 use crate::input::job::Job;
 use crate::outcome::{Code, Status};
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// Why what should follow did not.
 #[derive(Debug, thiserror::Error)]
-pub enum ChainError {
+pub enum PostProcessError {
     /// The commands could not be run.
     #[error(transparent)]
     Hook(#[from] HookError),
@@ -23,7 +23,7 @@ pub enum ChainError {
     Publish(#[from] PublishError),
     /// The input could not be put away.
     #[error(transparent)]
-    PutAway(#[from] PutAwayError),
+    Archive(#[from] ArchiveError),
 }
 
 /// How long a file must have been as it is before it is put away. A writer that pauses for longer loses what it writes
@@ -35,7 +35,7 @@ const POLL: Duration = Duration::from_millis(50);
 
 /// What became of what follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Followed {
+pub enum PostStatus {
     /// All is done.
     Whole,
     /// The job was no longer wanted.
@@ -69,22 +69,27 @@ pub fn is_asked_for(settings: &Settings, status: Status) -> bool {
 /// Runs the commands that are due on the result of `job`. Where all of them have succeeded, puts the input away.
 ///
 /// # Errors
-/// [`ChainError`] where the system fails; a command that fails is told in hooks.json.
-pub fn run(job: &Job, report: &Report, settings: &Settings, publisher: &Publisher) -> Result<Followed, ChainError> {
+/// [`PostProcessError`] where the system fails; a command that fails is told in hooks.json.
+pub fn run(
+    job: &Job,
+    report: &Report,
+    settings: &Settings,
+    publisher: &Publisher,
+) -> Result<PostStatus, PostProcessError> {
     let (hooks, inputs) = follows(settings, report.status);
     let target = target(job, report, publisher)?;
     if hooks::are_due(hooks, &target) {
         tracing::info!(commands = hooks.len(), "runs commands");
         match hooks::run(hooks, &target, &publisher.staging()?, &|| job.is_wanted())? {
-            Chain::BrokenOff => return Ok(Followed::BrokenOff),
-            Chain::Taken(command) => return Ok(Followed::Taken(command)),
+            Chain::BrokenOff => return Ok(PostStatus::BrokenOff),
+            Chain::Taken(command) => return Ok(PostStatus::Taken(command)),
             Chain::Over(account) if account.failure().is_none() => tracing::info!("commands have succeeded"),
             Chain::Over(_) => {}
         }
     }
     let all_succeeded = hooks.is_empty() || hooks::account(&target).is_some_and(|a| a.failure().is_none());
     if !all_succeeded || !may_go(job, report) {
-        return Ok(Followed::Whole);
+        return Ok(PostStatus::Whole);
     }
     done_with(job, report, (inputs, &target), publisher)
 }
@@ -112,13 +117,13 @@ fn done_with(
     report: &Report,
     (inputs, result): (&Inputs, &Target),
     publisher: &Publisher,
-) -> Result<Followed, ChainError> {
+) -> Result<PostStatus, PostProcessError> {
     let (Some(look), Some(since), Some(inbox)) = (&job.look, job.since, &job.within) else {
-        return Ok(Followed::Whole);
+        return Ok(PostStatus::Whole);
     };
     let target;
     let way = match inputs {
-        Inputs::Keep => return Ok(Followed::Whole),
+        Inputs::Keep => return Ok(PostStatus::Whole),
         Inputs::Delete => Way::Nowhere,
         Inputs::Move(folder) => {
             target = folder.join(&job.name);
@@ -127,15 +132,15 @@ fn done_with(
     };
     // What was not read, as it is too large or not for this user, cannot be told from what is there now: it stays.
     let hash = report.input.blake3.as_ref().and_then(|hash| Hash::from_hex(hash).ok());
-    let Some(hash) = hash else { return Ok(Followed::Whole) };
+    let Some(hash) = hash else { return Ok(PostStatus::Whole) };
     let quiet = since + QUIET;
     if !ledger::is_final(report) {
         // Taken up later, it would not be up to date, but computed again, and its commands would run again.
         if !wait_until(quiet, job) {
-            return Ok(Followed::BrokenOff);
+            return Ok(PostStatus::BrokenOff);
         }
     } else if Instant::now() < quiet {
-        return Ok(Followed::Until(quiet));
+        return Ok(PostStatus::Until(quiet));
     }
     // Where somebody has taken the result meanwhile, the input is all that is left.
     if !result.is_there() {
@@ -143,10 +148,10 @@ fn done_with(
     }
     // The input is all that the result could be made from again.
     publisher.secure(&job.name)?;
-    Ok(match put_away(&System, &Processed { inbox, name: &job.name, look, hash }, way)? {
-        Fate::Busy => Followed::Busy,
-        Fate::Changed => Followed::Changed,
-        Fate::Away | Fate::Nothing => Followed::Whole,
+    Ok(match archive(&System, &Processed { inbox, name: &job.name, look, hash }, way)? {
+        Fate::Busy => PostStatus::Busy,
+        Fate::Changed => PostStatus::Changed,
+        Fate::Away | Fate::Nothing => PostStatus::Whole,
     })
 }
 
@@ -164,7 +169,7 @@ mod tests {
     use crate::outcome::Reason;
     use crate::report::Input;
     use crate::result_files;
-    use crate::settings::Said;
+    use crate::settings::RawSettings;
     use std::fs;
     use std::path::Path;
 
@@ -183,7 +188,7 @@ mod tests {
             fs::write(folder.path().join("in/a.stl"), "content").expect("written");
             let command = "[[on_refused]]\ncommand = [\"sh\", \"-c\", \"echo $1 >> ../../runs\", \"sh\", \"{code}\"]\n";
             let said = format!("refused = \"move:{}\"\n{command}", folder.path().join("bad").display());
-            let settings = toml::from_str::<Said>(&said).expect("valid").check().expect("in range");
+            let settings = toml::from_str::<RawSettings>(&said).expect("valid").check().expect("in range");
             let blake3 = Some(blake3::hash(b"content").to_hex().to_string());
             let input = Input { name: "a.stl".to_owned(), bytes: Some(7), blake3, beside: vec![] };
             let mut report = Report::new(input, &settings);
@@ -198,12 +203,13 @@ mod tests {
         /// The job of the file, which is as it is for so long.
         fn job(&self, since: Duration) -> Job {
             let inbox = self.folder.path().join("in");
-            let look = crate::system::fingerprint::Look::at(&inbox.join("a.stl")).expect("there").expect("a file");
+            let look =
+                crate::system::fingerprint::Fingerprint::at(&inbox.join("a.stl")).expect("there").expect("a file");
             let since = Instant::now().checked_sub(since).expect("the machine runs for longer");
             Job::of_inbox(&inbox, Path::new("a.stl"), look, since)
         }
 
-        fn run(&self, job: &Job) -> Result<Followed, ChainError> {
+        fn run(&self, job: &Job) -> Result<PostStatus, PostProcessError> {
             run(job, &self.report, &self.settings, &self.publisher)
         }
 
@@ -219,9 +225,9 @@ mod tests {
     #[test]
     fn a_refused_input_is_moved_later_and_its_commands_run_once() {
         let world = World::new(Code::Malformed);
-        assert!(matches!(world.run(&world.job(Duration::ZERO)), Ok(Followed::Until(_))));
+        assert!(matches!(world.run(&world.job(Duration::ZERO)), Ok(PostStatus::Until(_))));
         assert!(world.has("in/a.stl") && world.runs() == "malformed\n");
-        assert!(matches!(world.run(&world.job(QUIET)), Ok(Followed::Whole)));
+        assert!(matches!(world.run(&world.job(QUIET)), Ok(PostStatus::Whole)));
         assert!(world.has("bad/a.stl") && !world.has("in/a.stl") && world.runs() == "malformed\n");
     }
 
@@ -230,7 +236,7 @@ mod tests {
     fn a_failed_input_is_waited_for() {
         let world = World::new(Code::Internal);
         let job = world.job(QUIET - Duration::from_millis(500));
-        assert!(matches!(world.run(&job), Ok(Followed::Whole)));
+        assert!(matches!(world.run(&job), Ok(PostStatus::Whole)));
         assert!(world.has("bad/a.stl") && !world.has("in/a.stl") && world.runs() == "internal\n");
         let world = World::new(Code::Internal);
         let job = world.job(Duration::ZERO);
@@ -240,7 +246,7 @@ mod tests {
                 std::thread::sleep(POLL);
             }
             job.cancel();
-            assert!(matches!(ran.join().expect("no panic"), Ok(Followed::BrokenOff)));
+            assert!(matches!(ran.join().expect("no panic"), Ok(PostStatus::BrokenOff)));
         });
         assert!(world.has("in/a.stl") && !world.has("bad"));
     }
@@ -248,13 +254,13 @@ mod tests {
     #[test]
     fn an_input_whose_result_is_gone_stays() {
         let world = World::new(Code::Malformed);
-        assert!(matches!(world.run(&world.job(Duration::ZERO)), Ok(Followed::Until(_))));
+        assert!(matches!(world.run(&world.job(Duration::ZERO)), Ok(PostStatus::Until(_))));
         fs::rename(world.folder.path().join("out/a.stl"), world.folder.path().join("taken")).expect("moved");
         world.run(&world.job(QUIET)).expect("there is no account any more");
         assert!(world.has("in/a.stl") && !world.has("bad"));
         let without_commands = Settings { on_refused: vec![], ..world.settings.clone() };
         let gone = run(&world.job(QUIET), &world.report, &without_commands, &world.publisher);
-        assert!(matches!(gone, Err(ChainError::Hook(HookError::NoReport(_)))), "{gone:?}");
+        assert!(matches!(gone, Err(PostProcessError::Hook(HookError::NoReport(_)))), "{gone:?}");
         assert!(world.has("in/a.stl") && !world.has("bad"));
     }
 
@@ -262,17 +268,17 @@ mod tests {
     fn inputs_that_ask_for_others_or_were_not_read_stay() {
         for code in [Code::ForeignFile, Code::MissingFile] {
             let world = World::new(code);
-            assert!(matches!(world.run(&world.job(QUIET)), Ok(Followed::Whole)));
+            assert!(matches!(world.run(&world.job(QUIET)), Ok(PostStatus::Whole)));
             assert!(world.has("in/a.stl") && !world.runs().is_empty());
         }
         let mut world = World::new(Code::TooLarge);
         world.report.input.blake3 = None;
-        assert!(matches!(world.run(&world.job(QUIET)), Ok(Followed::Whole)));
+        assert!(matches!(world.run(&world.job(QUIET)), Ok(PostStatus::Whole)));
         assert!(world.has("in/a.stl") && !world.has("bad"));
         let world = World::new(Code::Malformed);
         let job = world.job(QUIET);
         job.set_beside(vec!["a.bin".to_owned()]);
-        assert!(matches!(world.run(&job), Ok(Followed::Whole)));
+        assert!(matches!(world.run(&job), Ok(PostStatus::Whole)));
         assert!(world.has("in/a.stl") && !world.has("bad"));
     }
 }

@@ -5,7 +5,7 @@
 //! this does not hold: an older or newer result is whole at any time; in the end each input has one whole result, and its
 //! content is where it belongs; nothing of others has gone; nothing is left over; and all of that is on disk.
 
-use crate::after::archive::{Fate, Processed, Way, put_away};
+use crate::after::archive::{Fate, Processed, Way, archive};
 use crate::after::holding;
 use crate::input;
 use crate::outcome::Status;
@@ -13,10 +13,10 @@ use crate::output::ledger;
 use crate::output::publish::{Content, PublishError, Publisher};
 use crate::report::{Input, Output, Report};
 use crate::result_files;
-use crate::settings::{Said, Settings};
+use crate::settings::{RawSettings, Settings};
 use crate::system::disk::simulated::{Abilities, Left, Lies, Plan, Seen, Simulated};
 use crate::system::disk::{Disk, Kind, replace_file};
-use crate::system::fingerprint::Look;
+use crate::system::fingerprint::Fingerprint;
 use parking_lot::Mutex;
 use rustix::io::Errno;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,7 +35,7 @@ const TROUBLES: [Errno; 7] =
     [Errno::IO, Errno::STALE, Errno::MFILE, Errno::NOMEM, Errno::TIMEDOUT, Errno::NOSPC, Errno::XDEV];
 
 /// Those of every scene: to check them, the machine is looked at.
-static SETTINGS: LazyLock<Settings> = LazyLock::new(|| Said::default().check().expect("in range"));
+static SETTINGS: LazyLock<Settings> = LazyLock::new(|| RawSettings::default().check().expect("in range"));
 
 /// After so many operations, a process has begun: no single failure ends it any more.
 const STARTED: usize = 40;
@@ -118,10 +118,13 @@ fn older_content(name: &str) -> Vec<u8> {
     format!("older {name}").into_bytes()
 }
 
-fn report_of(name: &str, content: &[u8]) -> Report {
+fn input_of(name: &str, content: &[u8]) -> Input {
     let blake3 = Some(blake3::hash(content).to_hex().to_string());
-    let input = Input { name: name.to_owned(), bytes: Some(content.len() as u64), blake3, beside: vec![] };
-    Report { status: Status::Certified, ..Report::new(input, &SETTINGS) }
+    Input { name: name.to_owned(), bytes: Some(content.len() as u64), blake3, beside: vec![] }
+}
+
+fn report_of(name: &str, content: &[u8]) -> Report {
+    Report { status: Status::Certified, ..Report::new(input_of(name, content), &SETTINGS) }
 }
 
 fn result_of(name: &str, content: &[u8]) -> Vec<Content> {
@@ -216,9 +219,9 @@ fn process(disk: &Simulated, stage: &Stage, publisher: &Publisher<Simulated>, na
         Inputs::Move | Inputs::MoveFar => Way::To(&moved),
     };
     publisher.secure(name.as_ref()).map_err(|error| error.to_string())?;
-    let (look, hash) = (Look::of_stat(&seen), blake3::hash(&content));
+    let (look, hash) = (Fingerprint::of_stat(&seen), blake3::hash(&content));
     let input = Processed { inbox: IN.as_ref(), name: name.as_ref(), look: &look, hash };
-    match put_away(disk, &input, way).map_err(|error| error.to_string())? {
+    match archive(disk, &input, way).map_err(|error| error.to_string())? {
         Fate::Away | Fate::Nothing => Ok(()),
         fate => Err(format!("{fate:?}")),
     }
@@ -242,9 +245,8 @@ fn publish(
     let target = publisher.target(name.as_ref());
     let beside = input::Folder::of(name.as_ref());
     let older = disk.open(&target).ok();
-    let is_done = older.is_some_and(|older| {
-        ledger::up_to_date_in(&older, &Report { status: Status::Failed, ..report_of(name, content) }, &beside).is_some()
-    });
+    let is_done = older
+        .is_some_and(|older| ledger::up_to_date_in(&older, &input_of(name, content), &SETTINGS, &beside).is_some());
     if !is_done && !publisher.publish(name.as_ref(), &result_of(name, content), wanted)? {
         return Err(failed(Errno::AGAIN.into()));
     }
@@ -736,6 +738,6 @@ fn full_kills_failures_and_others_at_every_operation() {
             }
         }
     }
-    tally.assert_right("all scenes");
+    tally.assert_right("full: kills, failures and others at every operation");
     assert!(tally.scenes >= 10_000);
 }

@@ -3,31 +3,31 @@
 //! Several accounts share one limit. An input takes the memory of its data before it is read and holds it until its
 //! result stands; a chart takes that of a factorisation before it begins. Neither waits for ever: where its own account
 //! is empty, a request is granted whatever its size, so that an input larger than the budget is done too; and who holds
-//! a factorisation waits for nothing but its turn to compute. Inputs of each belt have an account of their own, so that
+//! a factorisation waits for nothing but its turn to compute. Inputs of each lane have an account of their own, so that
 //! a large one does not keep small ones from being read; what they take beyond the limit is little. Requests of one
 //! account are granted in the order of their turns.
 
-use super::queue::{BELTS, Turn};
+use super::queue::{LANES, Turn};
 use super::sync::{Condvar, Mutex};
 use std::collections::BTreeSet;
 
 /// Who asks for memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Account {
-    /// The data of an input of this belt.
+    /// The data of an input of this lane.
     Input(usize),
     /// A factorisation.
     Factor,
 }
 
 /// How many accounts there are.
-const ACCOUNTS: usize = BELTS + 1;
+const ACCOUNTS: usize = LANES + 1;
 
 impl Account {
     fn index(self) -> usize {
         match self {
-            Self::Input(belt) => belt.min(BELTS - 1),
-            Self::Factor => BELTS,
+            Self::Input(lane) => lane.min(LANES - 1),
+            Self::Factor => LANES,
         }
     }
 }

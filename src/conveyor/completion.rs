@@ -9,7 +9,7 @@ use std::time::Instant;
 
 /// A job that has ended.
 #[derive(Debug)]
-pub struct Ended {
+pub struct Completion {
     /// The job.
     pub job: Arc<Job>,
     /// How it ended.

@@ -3,7 +3,7 @@
 
 use super::budget::{Account, Budget};
 use super::queue::Turn;
-use super::semaphore::Turnstile;
+use super::semaphore::PrioritySemaphore;
 
 /// Grants places and memory. Who holds a place waits for nothing else; see [`super`].
 pub(super) trait Grants: Send + Sync {
@@ -14,7 +14,7 @@ pub(super) trait Grants: Send + Sync {
     fn leave(&self);
 
     /// Called from inside: lets those ahead of `turn` pass.
-    fn let_pass(&self, turn: Turn);
+    fn yield_to(&self, turn: Turn);
 
     /// Whether somebody ahead of `turn` waits for a place.
     fn is_waited_for(&self, turn: Turn) -> bool;
@@ -35,32 +35,32 @@ pub(super) trait Grants: Send + Sync {
 /// Those of this process.
 #[derive(Debug)]
 pub(super) struct Own {
-    turnstile: Turnstile,
+    semaphore: PrioritySemaphore,
     budget: Budget,
 }
 
 impl Own {
     /// Places for so many computations, and so many bytes.
     pub fn new(places: usize, memory: u64) -> Self {
-        Self { turnstile: Turnstile::new(places), budget: Budget::new(memory) }
+        Self { semaphore: PrioritySemaphore::new(places), budget: Budget::new(memory) }
     }
 }
 
 impl Grants for Own {
     fn enter(&self, turn: Turn) {
-        self.turnstile.enter(turn);
+        self.semaphore.enter(turn);
     }
 
     fn leave(&self) {
-        self.turnstile.leave();
+        self.semaphore.leave();
     }
 
-    fn let_pass(&self, turn: Turn) {
-        self.turnstile.let_pass(turn);
+    fn yield_to(&self, turn: Turn) {
+        self.semaphore.yield_to(turn);
     }
 
     fn is_waited_for(&self, turn: Turn) -> bool {
-        self.turnstile.is_waited_for(turn)
+        self.semaphore.is_waited_for(turn)
     }
 
     fn try_take(&self, account: Account, bytes: u64) -> bool {

@@ -1,19 +1,19 @@
 //! A job between the stages: what it has taken and must give back, whatever becomes of it.
 
 use super::budget::Account;
-use super::completion::{End, Ended};
+use super::completion::{Completion, End};
 use super::grants::Grants;
-use super::progress::Board;
-use super::queue::{Queue, Turn, Waiting, belt};
+use super::progress::Progress;
+use super::queue::{Queue, Turn, Waiting, lane};
 use super::stage::Stage;
 use super::writing::Sink;
 use crate::formats::{self, Kind};
 use crate::input::{self, job::Job};
-use crate::outcome::Stopped;
+use crate::outcome::Abort;
 use crate::output::begun::{Begun, Entry, Suspect};
 use crate::settings::Settings;
 use crate::stages::guard;
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use crate::system::vitals;
 use crossbeam_channel::Sender;
 use parking_lot::{Mutex, RwLock};
@@ -35,8 +35,8 @@ pub(super) struct Shared {
     pub is_patient: bool,
     pub queue: Queue,
     pub grants: Arc<dyn Grants>,
-    pub board: Board,
-    pub ended: Sender<Ended>,
+    pub progress: Progress,
+    pub ended: Sender<Completion>,
     /// Steps that work has taken: a sign of life.
     pub steps: AtomicU64,
     /// Processes that died of inputs.
@@ -57,7 +57,7 @@ impl Shared {
 
 /// A job on its way. When the last stage lets go of it, its memory is given back and its end is told: exactly once,
 /// even where a stage breaks down.
-pub(super) struct Travel {
+pub(super) struct InFlight {
     pub shared: Arc<Shared>,
     pub job: Arc<Job>,
     pub number: u64,
@@ -82,14 +82,14 @@ fn memory(job: &Job) -> u64 {
     }
 }
 
-impl Travel {
+impl InFlight {
     /// Takes a job up, once there is memory for its data.
     pub fn begin(shared: &Arc<Shared>, Waiting { job, turn }: Waiting) -> Arc<Self> {
-        let number = shared.board.add(&job);
+        let number = shared.progress.add(&job);
         let is_to_be_done = job.is_wanted() && job.doubted.is_none();
         let foretold = if is_to_be_done { memory(&job) } else { 0 };
-        shared.grants.take(Account::Input(belt(job.bytes)), foretold, turn);
-        let span = tracing::info_span!("job", input = shown(&job.name));
+        shared.grants.take(Account::Input(lane(job.bytes)), foretold, turn);
+        let span = tracing::info_span!("job", input = escape(&job.name));
         let suspect = Mutex::new(span.in_scope(|| begin(shared, &job)));
         let (settings, memory) = (shared.settings(), foretold.into());
         let (shared, seconds, end) = (shared.clone(), Mutex::default(), Mutex::new(None));
@@ -142,19 +142,15 @@ impl Travel {
 
     /// Does the work of a stage: in its turn, its processor time booked. A panic is a failure of the job; what comes
     /// out for a job that nobody wants any more is dropped.
-    pub fn compute<T>(
-        &self,
-        stage: Stage,
-        work: impl FnOnce(&dyn Monitor) -> Result<T, Stopped>,
-    ) -> Result<T, Stopped> {
+    pub fn compute<T>(&self, stage: Stage, work: impl FnOnce(&dyn Monitor) -> Result<T, Abort>) -> Result<T, Abort> {
         self.reached(stage);
-        let seat = Seat::take(self);
+        let permit = Permit::take(self);
         let _in_stage = self.in_stage(stage);
         let started = vitals::processor_of_this_thread();
-        let result = if self.job.is_wanted() { guard(|| work(&seat)) } else { Err(Stopped::Unwanted) };
+        let result = if self.job.is_wanted() { guard(|| work(&permit)) } else { Err(Abort::Unwanted) };
         *self.seconds.lock().entry(stage.name()).or_insert(0.0) +=
             (vitals::processor_of_this_thread() - started).as_secs_f64();
-        if self.job.is_wanted() { result } else { Err(Stopped::Unwanted) }
+        if self.job.is_wanted() { result } else { Err(Abort::Unwanted) }
     }
 
     /// Log messages until the end of what is returned are those of this job and stage.
@@ -165,12 +161,12 @@ impl Travel {
     /// Tells that the job has come so far.
     pub fn reached(&self, stage: Stage) {
         self.shared.step();
-        self.shared.board.update(self.number, |job| job.stage = job.stage.max(stage));
+        self.shared.progress.update(self.number, |job| job.stage = job.stage.max(stage));
     }
 
     /// Tells how far a process of its own has come with it.
     pub fn is_at(&self, stage: Stage, charts_done: usize, charts: usize) {
-        self.shared.board.update(self.number, |job| {
+        self.shared.progress.update(self.number, |job| {
             job.stage = job.stage.max(stage);
             (job.charts_done, job.charts) = (charts_done, charts);
         });
@@ -178,7 +174,7 @@ impl Travel {
 
     /// Tells what keeps it from going on.
     pub fn is_in_trouble(&self, trouble: Option<String>) {
-        self.shared.board.update(self.number, |job| job.trouble = trouble);
+        self.shared.progress.update(self.number, |job| job.trouble = trouble);
     }
 
     /// The processor time of all stages so far. Milliseconds are enough, and read well.
@@ -189,7 +185,7 @@ impl Travel {
 
     /// The data of the input is gone: others may take its memory.
     pub fn give_memory_back(&self) {
-        self.shared.grants.give_back(Account::Input(belt(self.job.bytes)), self.memory.swap(0, Ordering::Relaxed));
+        self.shared.grants.give_back(Account::Input(lane(self.job.bytes)), self.memory.swap(0, Ordering::Relaxed));
     }
 
     /// How the job ended.
@@ -198,15 +194,15 @@ impl Travel {
     }
 }
 
-impl Drop for Travel {
+impl Drop for InFlight {
     fn drop(&mut self) {
         self.give_memory_back();
-        self.shared.board.remove(self.number);
+        self.shared.progress.remove(self.number);
         self.shared.step();
         self.shared.queue.ended(&self.job);
         let end = self.end.get_mut().take().unwrap_or(End::Lost);
         // Fails only where nobody asks any more.
-        let _ = self.shared.ended.send(Ended { job: self.job.clone(), end });
+        let _ = self.shared.ended.send(Completion { job: self.job.clone(), end });
     }
 }
 
@@ -220,34 +216,34 @@ fn begin(shared: &Shared, job: &Job) -> Option<Suspect> {
     Some(begun.about(&job.name, job.look, &staging))
 }
 
-/// A place inside the turnstile.
-struct Seat<'a>(&'a Travel);
+/// A place inside the semaphore.
+struct Permit<'a>(&'a InFlight);
 
-impl<'a> Seat<'a> {
-    fn take(travel: &'a Travel) -> Self {
-        travel.shared.grants.enter(travel.turn);
-        Self(travel)
+impl<'a> Permit<'a> {
+    fn take(in_flight: &'a InFlight) -> Self {
+        in_flight.shared.grants.enter(in_flight.turn);
+        Self(in_flight)
     }
 }
 
-impl Drop for Seat<'_> {
+impl Drop for Permit<'_> {
     fn drop(&mut self) {
         self.0.shared.grants.leave();
     }
 }
 
-impl Monitor for Seat<'_> {
+impl Monitor for Permit<'_> {
     fn should_continue(&self) -> bool {
-        let Travel { shared, turn, job, .. } = self.0;
+        let InFlight { shared, turn, job, .. } = self.0;
         shared.step();
         if job.is_wanted() {
-            shared.grants.let_pass(*turn);
+            shared.grants.yield_to(*turn);
         }
         job.is_wanted()
     }
 
     fn reserve(&self, bytes: u64) {
-        let Travel { shared, turn, job, .. } = self.0;
+        let InFlight { shared, turn, job, .. } = self.0;
         if !job.is_wanted() {
             shared.grants.overdraw(Account::Factor, bytes);
         } else if !shared.grants.try_take(Account::Factor, bytes) {
@@ -269,21 +265,21 @@ pub(super) mod tests {
     use crate::conveyor::grants::Own;
     use crate::outcome::Code;
     use crate::output::publish::Publisher;
-    use crate::settings::Said;
+    use crate::settings::RawSettings;
     use crossbeam_channel::{Receiver, bounded};
 
     /// What threads share, with an output folder that goes with it.
-    pub fn shared(memory: u64) -> (Arc<Shared>, Receiver<Ended>, tempfile::TempDir) {
+    pub fn shared(memory: u64) -> (Arc<Shared>, Receiver<Completion>, tempfile::TempDir) {
         let out = tempfile::tempdir().expect("a folder");
         let (ended, to_tell) = bounded(8);
         let shared = Shared {
-            settings: RwLock::new(Arc::new(Said::default().check().expect("in range"))),
+            settings: RwLock::new(Arc::new(RawSettings::default().check().expect("in range"))),
             sink: Sink::Out(Arc::new(Publisher::open(out.path()).expect("opens"))),
             begun: None,
             is_patient: false,
             queue: Queue::default(),
             grants: Arc::new(Own::new(1, memory)),
-            board: Board::default(),
+            progress: Progress::default(),
             ended,
             steps: AtomicU64::new(0),
             deaths: AtomicU64::new(0),
@@ -291,9 +287,9 @@ pub(super) mod tests {
         (Arc::new(shared), to_tell, out)
     }
 
-    pub fn begin(shared: &Arc<Shared>) -> Arc<Travel> {
+    pub fn begin(shared: &Arc<Shared>) -> Arc<InFlight> {
         let job = Arc::new(Job::new("a.stl".into(), "a.stl".into(), 100));
-        Travel::begin(shared, Waiting { job, turn: 1 })
+        InFlight::begin(shared, Waiting { job, turn: 1 })
     }
 
     #[test]
@@ -305,19 +301,19 @@ pub(super) mod tests {
     #[test]
     fn a_panic_is_a_failure_of_its_job_and_what_it_held_is_given_back() {
         let (shared, ended, _out) = shared(1 << 20);
-        let travel = begin(&shared);
-        assert_eq!(shared.board.running().len(), 1);
-        let stopped = travel.compute(Stage::Map, |monitor| -> Result<(), Stopped> {
+        let in_flight = begin(&shared);
+        assert_eq!(shared.progress.running().len(), 1);
+        let stopped = in_flight.compute(Stage::Map, |monitor| -> Result<(), Abort> {
             let _held = planish_core::monitor::Reserved::new(monitor, 1 << 19);
             panic!("a fault, for the test");
         });
-        assert!(matches!(stopped, Err(Stopped::For(reason)) if reason.code == Code::Internal));
+        assert!(matches!(stopped, Err(Abort::For(reason)) if reason.code == Code::Internal));
         // Place and memory are free again; and nobody told how the job ended.
-        assert_eq!(travel.compute(Stage::Map, |_| Ok(7)), Ok(7));
+        assert_eq!(in_flight.compute(Stage::Map, |_| Ok(7)), Ok(7));
         assert!(shared.grants.try_take(Account::Factor, 1 << 19));
-        drop(travel);
+        drop(in_flight);
         assert!(matches!(ended.try_recv().expect("told").end, End::Lost));
-        assert!(ended.try_recv().is_err() && shared.board.running().is_empty());
+        assert!(ended.try_recv().is_err() && shared.progress.running().is_empty());
         shared.grants.give_back(Account::Factor, 1 << 19);
         assert!(shared.grants.try_take(Account::Input(0), 1 << 20), "the memory for its data, too");
     }
@@ -325,28 +321,28 @@ pub(super) mod tests {
     #[test]
     fn what_nobody_wants_is_not_computed_or_dropped() {
         let (shared, ended, _out) = shared(1 << 20);
-        let travel = begin(&shared);
-        let stopped = travel.compute(Stage::Map, |monitor| {
+        let in_flight = begin(&shared);
+        let stopped = in_flight.compute(Stage::Map, |monitor| {
             assert!(monitor.should_continue());
-            travel.job.cancel();
+            in_flight.job.cancel();
             assert!(!monitor.should_continue());
             Ok(())
         });
-        assert_eq!(stopped, Err(Stopped::Unwanted));
-        assert_eq!(travel.compute(Stage::Map, |_| -> Result<(), _> { unreachable!() }), Err(Stopped::Unwanted));
-        travel.end(End::Unwanted);
-        drop(travel);
+        assert_eq!(stopped, Err(Abort::Unwanted));
+        assert_eq!(in_flight.compute(Stage::Map, |_| -> Result<(), _> { unreachable!() }), Err(Abort::Unwanted));
+        in_flight.end(End::Unwanted);
+        drop(in_flight);
         assert!(matches!(ended.try_recv().expect("told").end, End::Unwanted));
     }
 
-    /// A job that waits for memory has left the turnstile: who holds the memory can go on.
+    /// A job that waits for memory has left the semaphore: who holds the memory can go on.
     #[test]
     fn who_waits_for_memory_does_not_keep_others_from_computing() {
         let (shared, _ended, _out) = shared(1 << 20);
         let travels = [begin(&shared), begin(&shared)];
-        let rounds = |travel: &Arc<Travel>| {
+        let rounds = |in_flight: &Arc<InFlight>| {
             for _ in 0..200 {
-                let done = travel.compute(Stage::Map, |monitor| {
+                let done = in_flight.compute(Stage::Map, |monitor| {
                     let _held = planish_core::monitor::Reserved::new(monitor, 3 << 18);
                     monitor.should_continue();
                     Ok(())

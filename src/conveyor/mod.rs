@@ -4,11 +4,11 @@
 //! What travels before mapping and after it is a chart, not a file: the charts of one large input keep all processors
 //! busy, and so do many small inputs. Rules that keep it moving:
 //!
-//! * There are three such belts, for small, middling and large inputs, so that no small input waits in a channel behind
+//! * There are three such lanes, for small, middling and large inputs, so that no small input waits in a channel behind
 //!   the charts of a large one. Among themselves inputs wait in a fair order ([`queue`]).
 //! * What is large is done by a process of its own ([`apart`]), which has the same stages, so that what it dies of is its
 //!   own affair.
-//! * No more computations run at once than `--jobs` says, over all belts and processes ([`semaphore`]). Nobody waits for a
+//! * No more computations run at once than `--jobs` says, over all lanes and processes ([`semaphore`]). Nobody waits for a
 //!   channel, memory or a disk while it holds a place; and channels lead forward only. So somebody always moves.
 //! * Inputs take memory before they are read, charts before they are factorised ([`budget`]).
 //! * A panic is caught where it happens and is a failure of its job. A job's end is told exactly once.
@@ -30,20 +30,20 @@ mod surface;
 mod sync;
 mod writing;
 
-use crate::after::post_process::{self, Followed};
+use crate::after::post_process::{self, PostStatus};
 use crate::input::job::Job;
-use crate::outcome::{Status, Stopped};
+use crate::outcome::{Abort, Status};
 use crate::output::begun::Begun;
 use crate::output::publish::{PublishError, Publisher};
-use crate::report::Report;
+use crate::report::{Decomposition, Facts, Report, SurfaceFacts};
 use crate::settings::Settings;
 use crate::stages;
 use apart::parent::Parent;
 use apart::stage::do_apart;
-use completion::{Done, End, Ended};
+use completion::{Completion, Done, End};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use grants::{Grants, Own};
-use in_flight::{Shared, Travel};
+use in_flight::{InFlight, Shared};
 use parking_lot::RwLock;
 use planish_core::mesh::TriangleSoup;
 use planish_core::monitor::Monitor;
@@ -58,7 +58,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::Duration;
-use surface::{Place, Surface};
+use surface::{PartIndex, Surface};
 use writing::{After, Sink};
 
 /// Ended jobs that nobody has asked for yet, at most.
@@ -68,13 +68,13 @@ const ENDED: usize = 64;
 /// what the budget gives them.
 pub const CHAINED: usize = 1024;
 
-/// Results that are written at once, per belt: writing waits for the disk.
+/// Results that are written at once, per lane: writing waits for the disk.
 const WRITERS: usize = 4;
 
 /// The running stages.
 pub struct Conveyor {
     shared: Arc<Shared>,
-    ended: Receiver<Ended>,
+    ended: Receiver<Completion>,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -90,8 +90,8 @@ impl Conveyor {
         let (chain, chained) = bounded(CHAINED);
         let (parked, to_look_after) = bounded(CHAINED);
         let after = Arc::new(After { chain, parked });
-        for belt in 0..queue::BELTS {
-            conveyor.belt(belt, &after)?;
+        for lane in 0..queue::LANES {
+            conveyor.lane(lane, &after)?;
         }
         let chain = after.chain.clone();
         conveyor.thread("parked", move || writing::look_after(to_look_after, &chain))?;
@@ -109,7 +109,7 @@ impl Conveyor {
         // Nothing follows in this process.
         let (chain, _) = bounded(1);
         let (parked, to_look_after) = bounded(1);
-        conveyor.belt(queue::belt(bytes), &Arc::new(After { chain: chain.clone(), parked }))?;
+        conveyor.lane(queue::lane(bytes), &Arc::new(After { chain: chain.clone(), parked }))?;
         conveyor.thread("parked", move || writing::look_after(to_look_after, &chain))?;
         Ok(conveyor)
     }
@@ -117,14 +117,15 @@ impl Conveyor {
     fn idle(settings: &Settings, sink: Sink, grants: Arc<dyn Grants>, begun: Option<Begun>, is_patient: bool) -> Self {
         let (ended, to_tell) = bounded(ENDED);
         let settings = RwLock::new(Arc::new(settings.clone()));
-        let (queue, board) = (Queue::default(), progress::Board::default());
+        let (queue, progress) = (Queue::default(), progress::Progress::default());
         let (steps, deaths) = Default::default();
-        let shared = Arc::new(Shared { settings, sink, begun, is_patient, queue, grants, board, ended, steps, deaths });
+        let shared =
+            Arc::new(Shared { settings, sink, begun, is_patient, queue, grants, progress, ended, steps, deaths });
         Self { shared, ended: to_tell, threads: Vec::new() }
     }
 
-    /// Starts the stages of one belt.
-    fn belt(&mut self, belt: usize, after: &Arc<After>) -> std::io::Result<()> {
+    /// Starts the stages of one lane.
+    fn lane(&mut self, lane: usize, after: &Arc<After>) -> std::io::Result<()> {
         let jobs = self.shared.settings().jobs;
         let (soups, to_cut) = bounded(1);
         let (apart, to_do_apart) = bounded(1);
@@ -134,8 +135,8 @@ impl Conveyor {
         let shared = self.shared.clone();
         let next = Next { soups, apart, finished: finished.clone(), chain: after.chain.clone() };
         self.thread("read", move || {
-            while let Some(waiting) = shared.queue.pop(belt) {
-                survive(|| reading::read(Travel::begin(&shared, waiting), &next));
+            while let Some(waiting) = shared.queue.pop(lane) {
+                survive(|| reading::read(InFlight::begin(&shared, waiting), &next));
             }
         })?;
         if self.shared.sink.publisher().is_some() {
@@ -203,12 +204,12 @@ impl Conveyor {
     }
 
     /// Jobs as they end: each exactly once.
-    pub fn ended(&self) -> &Receiver<Ended> {
+    pub fn ended(&self) -> &Receiver<Completion> {
         &self.ended
     }
 
     /// The next job that ends; none: none did within `patience`.
-    pub fn next(&self, patience: Duration) -> Option<Ended> {
+    pub fn next(&self, patience: Duration) -> Option<Completion> {
         self.ended.recv_timeout(patience).ok()
     }
 
@@ -219,7 +220,7 @@ impl Conveyor {
 
     /// The jobs on their way.
     pub fn running(&self) -> Vec<Running> {
-        self.shared.board.running()
+        self.shared.progress.running()
     }
 
     /// Waits until all stages have ended, after [`Self::close`]; what ends meanwhile is not told any more.
@@ -246,22 +247,22 @@ fn survive(work: impl FnOnce()) {
 
 /// What decomposition gets.
 struct Soup {
-    travel: Arc<Travel>,
-    report: Report,
+    in_flight: Arc<InFlight>,
+    facts: Facts,
     soup: TriangleSoup,
 }
 
 /// What mapping gets.
 struct Cut {
     surface: Arc<Surface>,
-    place: Place,
+    part_index: PartIndex,
     job: ChartJob,
 }
 
 /// What untangling gets.
 struct Mapped {
     surface: Arc<Surface>,
-    place: Place,
+    part_index: PartIndex,
     mapped: MappedChart,
 }
 
@@ -270,12 +271,12 @@ enum Finished {
     /// All charts are in, or one stopped the job.
     Surface(Arc<Surface>),
     /// There are no charts.
-    Stopped(Arc<Travel>, Box<Report>, Stopped),
+    Abort(Arc<InFlight>, Box<Facts>, Abort),
 }
 
 /// What the commands get: a result.
 struct Chained {
-    travel: Arc<Travel>,
+    in_flight: Arc<InFlight>,
     done: Done,
 }
 
@@ -285,53 +286,70 @@ fn hand_on<T>(to: &Sender<T>, item: T) {
     let _ = to.send(item);
 }
 
-fn cut(Soup { travel, mut report, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
-    match travel.compute(Stage::Decompose, |monitor| stages::plan(soup, &travel.settings, &mut report, monitor)) {
-        Err(why) => hand_on(finished, Finished::Stopped(travel, Box::new(report), why)),
+fn cut(Soup { in_flight, mut facts, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
+    let cut = in_flight.compute(Stage::Decompose, |monitor| {
+        let found = stages::repaired(&soup, &in_flight.settings)?;
+        // The surface is all that is needed from here on.
+        drop(soup);
+        let surface = facts.surface.insert(SurfaceFacts::of(&found));
+        surface.warnings.iter().for_each(|warning| tracing::warn!("{}", warning.message));
+        let (plan, refused) = stages::plan(found, &in_flight.settings, monitor)?;
+        surface.refused = refused;
+        surface.decomposition = Some(Decomposition {
+            feature_edges: plan.feature_edges,
+            ears_split: plan.ears_split,
+            ..Decomposition::default()
+        });
+        Ok(plan)
+    });
+    match cut {
+        Err(why) => hand_on(finished, Finished::Abort(in_flight, Box::new(facts), why)),
         Ok(Plan { mesh, jobs, .. }) => {
-            let surface = Surface::new(travel, mesh, jobs.len(), report);
+            let surface = Surface::new(in_flight, mesh, jobs.len(), facts);
             for (i, job) in jobs.into_iter().enumerate() {
-                hand_on(charts, Cut { surface: surface.clone(), place: (i, 0), job });
+                hand_on(charts, Cut { surface: surface.clone(), part_index: (i, 0), job });
             }
         }
     }
 }
 
-fn map(Cut { surface, place, job }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
+fn map(Cut { surface, part_index, job }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
+    let in_flight = &surface.in_flight;
     let work = |monitor: &dyn Monitor| stages::map(job, monitor);
-    let parts = if surface.is_due(place) { surface.travel.compute(Stage::Map, work) } else { Err(Stopped::Unwanted) };
+    let parts = if surface.is_pending(part_index) { in_flight.compute(Stage::Map, work) } else { Err(Abort::Unwanted) };
     match parts {
-        Err(why) => deposit(surface, place, Err(why), finished),
+        Err(why) => complete_part(surface, part_index, Err(why), finished),
         Ok(parts) => {
             surface.expect(parts.len() - 1);
             for (k, mapped) in parts.into_iter().enumerate() {
-                hand_on(untangle, Mapped { surface: surface.clone(), place: (place.0, k), mapped });
+                hand_on(untangle, Mapped { surface: surface.clone(), part_index: (part_index.0, k), mapped });
             }
         }
     }
 }
 
-fn untangle(Mapped { surface, place, mapped }: Mapped, finished: &Sender<Finished>) {
-    let travel = &surface.travel;
+fn untangle(Mapped { surface, part_index, mapped }: Mapped, finished: &Sender<Finished>) {
+    let in_flight = &surface.in_flight;
     let work = |monitor: &dyn Monitor| stages::untangle(mapped, monitor);
-    let part = if surface.is_due(place) { travel.compute(Stage::Untangle, work) } else { Err(Stopped::Unwanted) };
-    deposit(surface, place, part, finished);
+    let part =
+        if surface.is_pending(part_index) { in_flight.compute(Stage::Untangle, work) } else { Err(Abort::Unwanted) };
+    complete_part(surface, part_index, part, finished);
 }
 
-fn deposit(
+fn complete_part(
     surface: Arc<Surface>,
-    place: Place,
-    part: Result<Vec<CertifiedChart>, Stopped>,
+    part_index: PartIndex,
+    part: Result<Vec<CertifiedChart>, Abort>,
     finished: &Sender<Finished>,
 ) {
-    if surface.deposit(place, part) {
+    if surface.complete_part(part_index, part) {
         hand_on(finished, Finished::Surface(surface));
     }
 }
 
-fn unwritten(travel: &Travel, error: PublishError) {
+fn unwritten(in_flight: &InFlight, error: PublishError) {
     tracing::error!("the result is not written: {error}");
-    travel.end(End::Unwritten(error));
+    in_flight.end(End::Unwritten(error));
 }
 
 fn log(report: &Report) {
@@ -344,33 +362,33 @@ fn log(report: &Report) {
 
 /// A result stands: it goes to the commands, where there are any for such a one. These may take hours, and memory of their
 /// own.
-fn published(travel: Arc<Travel>, done: Done, chain: &Sender<Chained>) {
-    travel.give_memory_back();
-    if post_process::is_asked_for(&travel.settings, done.report.status) {
+fn published(in_flight: Arc<InFlight>, done: Done, chain: &Sender<Chained>) {
+    in_flight.give_memory_back();
+    if post_process::is_asked_for(&in_flight.settings, done.report.status) {
         // It may wait for the commands of others: that is no work that stands still.
-        travel.reached(Stage::Chain);
-        hand_on(chain, Chained { travel, done });
+        in_flight.reached(Stage::Chain);
+        hand_on(chain, Chained { in_flight, done });
     } else {
-        travel.end(End::Done(done));
+        in_flight.end(End::Done(done));
     }
 }
 
 /// Runs the commands on a result, and puts its input away.
-fn follow_up(Chained { travel, done }: Chained) {
-    let _in_stage = travel.in_stage(Stage::Chain);
-    let Some(publisher) = travel.shared.sink.publisher() else { return };
-    travel.end(match post_process::run(&travel.job, &done.report, &travel.settings, publisher) {
-        Ok(Followed::Whole) => End::Done(done),
-        Ok(Followed::BrokenOff) => End::Unwanted,
-        Ok(Followed::Until(then)) => End::Later(done, then),
-        Ok(Followed::Busy) => End::Held(done, "somebody has it open for writing: it is put away when it is closed"),
-        Ok(Followed::Changed) => {
+fn follow_up(Chained { in_flight, done }: Chained) {
+    let _in_stage = in_flight.in_stage(Stage::Chain);
+    let Some(publisher) = in_flight.shared.sink.publisher() else { return };
+    in_flight.end(match post_process::run(&in_flight.job, &done.report, &in_flight.settings, publisher) {
+        Ok(PostStatus::Whole) => End::Done(done),
+        Ok(PostStatus::BrokenOff) => End::Unwanted,
+        Ok(PostStatus::Until(then)) => End::Later(done, then),
+        Ok(PostStatus::Busy) => End::Held(done, "somebody has it open for writing: it is put away when it is closed"),
+        Ok(PostStatus::Changed) => {
             tracing::info!(
                 "changed since it was read, whether its size and times show it or not: it is processed again"
             );
             End::Outdated(done)
         }
-        Ok(Followed::Taken(command)) => {
+        Ok(PostStatus::Taken(command)) => {
             let error = taken(command);
             tracing::error!("{error}");
             End::Taken(done, error)

@@ -26,7 +26,7 @@ pub struct Running {
 
 /// All jobs on their way, in the order in which they were taken up.
 #[derive(Debug, Default)]
-pub struct Board(Mutex<Entries>);
+pub struct Progress(Mutex<Entries>);
 
 #[derive(Debug, Default)]
 struct Entries {
@@ -34,7 +34,7 @@ struct Entries {
     running: BTreeMap<u64, Running>,
 }
 
-impl Board {
+impl Progress {
     /// A job is taken up: returns its number.
     pub(super) fn add(&self, job: &Job) -> u64 {
         let mut entries = self.0.lock();

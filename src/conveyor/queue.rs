@@ -17,10 +17,10 @@ const OVERHEAD: u64 = 16 << 10;
 
 /// Jobs below these sizes (bytes) travel apart from larger ones, so that a stage never waits for a job that is
 /// thousands of times as large.
-const CLASSES: [u64; BELTS - 1] = [1 << 20, 16 << 20];
+const CLASSES: [u64; LANES - 1] = [1 << 20, 16 << 20];
 
-/// How many classes of size there are, and thus belts.
-pub const BELTS: usize = 3;
+/// How many classes of size there are, and thus lanes.
+pub const LANES: usize = 3;
 
 /// A job with its place in the order.
 #[derive(Clone, Debug)]
@@ -40,15 +40,15 @@ pub struct Queue {
 
 #[derive(Debug, Default)]
 struct State {
-    belts: [BTreeMap<(Turn, u64), Waiting>; BELTS],
+    lanes: [BTreeMap<(Turn, u64), Waiting>; LANES],
     arrivals: u64,
     ended: u64,
     closed: bool,
     paused: bool,
 }
 
-/// The belt for an input of `bytes`.
-pub fn belt(bytes: u64) -> usize {
+/// The lane for an input of `bytes`.
+pub fn lane(bytes: u64) -> usize {
     CLASSES.iter().take_while(|limit| bytes >= **limit).count()
 }
 
@@ -64,16 +64,16 @@ impl Queue {
         let turn = state.ended.saturating_add(cost(&job));
         state.arrivals += 1;
         let arrival = state.arrivals;
-        state.belts[belt(job.bytes)].insert((turn, arrival), Waiting { job, turn });
+        state.lanes[lane(job.bytes)].insert((turn, arrival), Waiting { job, turn });
         self.changed.notify_all();
     }
 
-    /// The next job for `belt`; waits for one. None: there will be no more.
-    pub fn pop(&self, belt: usize) -> Option<Waiting> {
+    /// The next job for `lane`; waits for one. None: there will be no more.
+    pub fn pop(&self, lane: usize) -> Option<Waiting> {
         let mut state = self.state.lock();
         loop {
             let may_go = !state.paused || state.closed;
-            if may_go && let Some((_, waiting)) = state.belts[belt].pop_first() {
+            if may_go && let Some((_, waiting)) = state.lanes[lane].pop_first() {
                 return Some(waiting);
             }
             if state.closed {
@@ -104,7 +104,7 @@ impl Queue {
     /// The jobs that wait, in the order in which they will be served as far as that is known.
     pub fn waiting(&self) -> Vec<Arc<Job>> {
         let state = self.state.lock();
-        let mut all: Vec<_> = state.belts.iter().flatten().collect();
+        let mut all: Vec<_> = state.lanes.iter().flatten().collect();
         all.sort_by_key(|(place, _)| **place);
         all.into_iter().filter(|(_, w)| w.job.is_wanted()).map(|(_, w)| w.job.clone()).collect()
     }
@@ -180,7 +180,7 @@ mod tests {
         queue.push(job("huge", 1 << 30));
         queue.close();
         let queue = &queue;
-        let rest = |belt| std::iter::from_fn(move || queue.pop(belt)).map(|w| w.job.name.display().to_string());
+        let rest = |lane| std::iter::from_fn(move || queue.pop(lane)).map(|w| w.job.name.display().to_string());
         assert_eq!(rest(0).collect::<Vec<_>>(), ["a", "b", "c"]);
         assert_eq!((rest(1).count(), rest(2).collect::<Vec<_>>()), (0, vec!["huge".to_owned()]));
     }

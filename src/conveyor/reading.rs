@@ -2,16 +2,16 @@
 
 use super::apart::stage::Apart;
 use super::completion::{Done, End};
-use super::in_flight::Travel;
+use super::in_flight::InFlight;
 use super::stage::Stage;
 use super::{Chained, Finished, Soup, hand_on, published, unwritten};
 use crate::formats::{Content, Notes};
 use crate::input::job::Job;
 use crate::input::{self, Folder};
-use crate::outcome::{Code, Reason, Stopped};
+use crate::outcome::{Abort, Code, Reason};
 use crate::output::begun::MOST_DEATHS;
 use crate::output::ledger;
-use crate::report::{Input, Report};
+use crate::report::{Facts, Input, Report};
 use blake3::Hash;
 use crossbeam_channel::Sender;
 use std::sync::Arc;
@@ -30,29 +30,29 @@ pub(super) struct Next {
 }
 
 /// Takes an input up.
-pub(super) fn read(travel: Arc<Travel>, next: &Next) {
-    if !travel.job.is_wanted() {
-        return travel.end(End::Unwanted);
+pub(super) fn read(in_flight: Arc<InFlight>, next: &Next) {
+    if !in_flight.job.is_wanted() {
+        return in_flight.end(End::Unwanted);
     }
-    if !travel.job.is_unchanged() {
-        return travel.end(End::Changed);
+    if !in_flight.job.is_unchanged() {
+        return in_flight.end(End::Changed);
     }
-    if let Some(hash) = travel.job.doubted {
-        return doubt(&travel, hash);
+    if let Some(hash) = in_flight.job.doubted {
+        return doubt(&in_flight, hash);
     }
-    if let Some(publisher) = travel.shared.sink.publisher()
-        && let Err(error) = publisher.admits(&travel.job.name)
+    if let Some(publisher) = in_flight.shared.sink.publisher()
+        && let Err(error) = publisher.admits(&in_flight.job.name)
     {
-        let _in_stage = travel.in_stage(Stage::Read);
-        return unwritten(&travel, error);
+        let _in_stage = in_flight.in_stage(Stage::Read);
+        return unwritten(&in_flight, error);
     }
-    if is_apart(&travel) { read_apart(travel, next) } else { read_here(travel, next) }
+    if is_apart(&in_flight) { read_apart(in_flight, next) } else { read_here(in_flight, next) }
 }
 
 /// Sees whether an input still has the content that was processed.
-fn doubt(travel: &Travel, hash: Hash) {
-    let _in_stage = travel.in_stage(Stage::Read);
-    travel.end(match input::hash_input(&travel.job, &travel.settings) {
+fn doubt(in_flight: &InFlight, hash: Hash) {
+    let _in_stage = in_flight.in_stage(Stage::Read);
+    in_flight.end(match input::hash_input(&in_flight.job, &in_flight.settings) {
         Ok((now, _)) if now == hash => End::Same,
         Err(refusal) if refusal.passes => End::Again(refusal.reason),
         _ => {
@@ -63,103 +63,104 @@ fn doubt(travel: &Travel, hash: Hash) {
 }
 
 /// Whether an input gets a process of its own.
-fn is_apart(travel: &Travel) -> bool {
-    let is_limited = travel.settings.job_memory.is_some() || travel.settings.job_time.is_some();
+fn is_apart(in_flight: &InFlight) -> bool {
+    let is_limited = in_flight.settings.job_memory.is_some() || in_flight.settings.job_time.is_some();
     // The process of a single job does it itself.
-    travel.shared.sink.publisher().is_some() && (is_limited || travel.deaths() > 0 || travel.foretold() >= APART)
+    in_flight.shared.sink.publisher().is_some()
+        && (is_limited || in_flight.deaths() > 0 || in_flight.foretold() >= APART)
 }
 
-fn read_here(travel: Arc<Travel>, next: &Next) {
-    travel.mark();
-    let content = input::read_input(&travel.job, &travel.settings);
-    if !travel.job.is_unchanged() {
-        return travel.end(End::Changed);
+fn read_here(in_flight: Arc<InFlight>, next: &Next) {
+    in_flight.mark();
+    let content = input::read_input(&in_flight.job, &in_flight.settings);
+    if !in_flight.job.is_unchanged() {
+        return in_flight.end(End::Changed);
     }
     let content = match content {
-        Err(reason) if reason.passes => return again(&travel, reason.reason),
+        Err(reason) if reason.passes => return again(&in_flight, reason.reason),
         content => content.map_err(|refusal| refusal.reason),
     };
-    let mut report = Report::new(input(&travel.job, content.as_deref().ok()), &travel.settings);
-    let folder = Folder::of_job(&travel.job);
-    let decoded = travel.compute(Stage::Read, |_| {
+    let mut facts = Facts::new(input(&in_flight.job, content.as_deref().ok()));
+    let folder = Folder::of_job(&in_flight.job);
+    let decoded = in_flight.compute(Stage::Read, |_| {
         let bytes = content?;
-        report.input.blake3 = Some(blake3::hash(&bytes).to_hex().to_string());
-        match up_to_date(&travel, &report, &folder) {
+        facts.input.blake3 = Some(blake3::hash(&bytes).to_hex().to_string());
+        match up_to_date(&in_flight, &facts.input, &folder) {
             Some(older) => Ok(Err(older)),
             None => {
-                let content = input::decode(&travel.job.path, &bytes, &travel.settings, &folder);
+                let content = input::decode(&in_flight.job.path, &bytes, &in_flight.settings, &folder);
                 let content = content.map_err(|refusal| {
-                    report.content = refusal.notes.map(|notes| *notes);
+                    facts.content = refusal.notes.map(|notes| *notes);
                     refusal.reason
                 })?;
-                input::check_memory(&content.soup, &travel.settings)?;
+                input::check_memory(&content.soup, &in_flight.settings)?;
                 Ok(Ok(content))
             }
         }
     });
-    travel.job.set_beside(folder.asked());
-    report.input.beside = folder.read();
+    in_flight.job.set_beside(folder.asked());
+    facts.input.beside = folder.read();
     match decoded {
         Ok(Ok(Content { soup, notes })) => {
-            warn_of_doubts(&travel, &notes);
-            report.content = Some(notes);
-            hand_on(&next.soups, Soup { travel, report, soup });
+            warn_of_doubts(&in_flight, &notes);
+            facts.content = Some(notes);
+            hand_on(&next.soups, Soup { in_flight, facts, soup });
         }
-        Ok(Err(older)) => leave(travel.clone(), older, next),
-        Err(Stopped::For(reason)) if reason.code == Code::MissingFile && travel.job.since.is_some() => {
-            travel.end(End::Waiting(reason));
+        Ok(Err(older)) => leave(in_flight.clone(), older, next),
+        Err(Abort::For(reason)) if reason.code == Code::MissingFile && in_flight.job.since.is_some() => {
+            in_flight.end(End::Waiting(reason));
         }
-        Err(why) => hand_on(&next.finished, Finished::Stopped(travel, Box::new(report), why)),
+        Err(why) => hand_on(&next.finished, Finished::Abort(in_flight, Box::new(facts), why)),
     }
 }
 
 /// The older result, where nothing is to be done.
-fn up_to_date(travel: &Travel, report: &Report, folder: &Folder) -> Option<Report> {
-    let publisher = travel.shared.sink.publisher().filter(|_| !travel.settings.force)?;
-    ledger::up_to_date(&publisher.target(&travel.job.name), report, folder)
+fn up_to_date(in_flight: &InFlight, input: &Input, folder: &Folder) -> Option<Report> {
+    let publisher = in_flight.shared.sink.publisher().filter(|_| !in_flight.settings.force)?;
+    ledger::up_to_date(&publisher.target(&in_flight.job.name), input, &in_flight.settings, folder)
 }
 
 /// An older result is up to date.
-fn leave(travel: Arc<Travel>, older: Report, next: &Next) {
-    travel.job.set_beside(older.input.beside.iter().map(|o| o.file.clone()).collect());
+fn leave(in_flight: Arc<InFlight>, older: Report, next: &Next) {
+    in_flight.job.set_beside(older.input.beside.iter().map(|o| o.file.clone()).collect());
     if older.reason.as_ref().is_none_or(|reason| reason.code != Code::Crashed) {
         // A process that died had done it.
-        travel.acquit();
+        in_flight.acquit();
     }
-    let _in_stage = travel.in_stage(Stage::Read);
+    let _in_stage = in_flight.in_stage(Stage::Read);
     tracing::info!(status = %older.status, "is up to date");
-    published(travel.clone(), Done { report: older, up_to_date: true }, &next.chain);
+    published(in_flight.clone(), Done { report: older, up_to_date: true }, &next.chain);
 }
 
 /// An input of which nothing is kept here: neither its bytes nor what becomes of them.
-fn read_apart(travel: Arc<Travel>, next: &Next) {
+fn read_apart(in_flight: Arc<InFlight>, next: &Next) {
     // Who waits for a disk holds no place to compute.
-    let hashed = input::hash_input(&travel.job, &travel.settings);
-    if !travel.job.is_unchanged() {
-        return travel.end(End::Changed);
+    let hashed = input::hash_input(&in_flight.job, &in_flight.settings);
+    if !in_flight.job.is_unchanged() {
+        return in_flight.end(End::Changed);
     }
-    let mut report = Report::new(input(&travel.job, None), &travel.settings);
+    let mut facts = Facts::new(input(&in_flight.job, None));
     let hash = match hashed {
         Ok((hash, bytes)) => {
-            report.input.bytes = Some(bytes);
-            report.input.blake3 = Some(hash.to_hex().to_string());
+            facts.input.bytes = Some(bytes);
+            facts.input.blake3 = Some(hash.to_hex().to_string());
             hash
         }
-        Err(refusal) if refusal.passes => return again(&travel, refusal.reason),
-        Err(refusal) => return stop(travel, report, refusal.reason.into(), next),
+        Err(refusal) if refusal.passes => return again(&in_flight, refusal.reason),
+        Err(refusal) => return stop(in_flight, facts, refusal.reason.into(), next),
     };
-    if let Some(older) = up_to_date(&travel, &report, &Folder::of_job(&travel.job)) {
-        return leave(travel, older, next);
+    if let Some(older) = up_to_date(&in_flight, &facts.input, &Folder::of_job(&in_flight.job)) {
+        return leave(in_flight, older, next);
     }
-    if travel.deaths() >= MOST_DEATHS && !travel.settings.force {
-        let reason = crashed(&format!("it was on its way when {} processes ended", travel.deaths()));
-        return stop(travel, report, reason.into(), next);
+    if in_flight.deaths() >= MOST_DEATHS && !in_flight.settings.force {
+        let reason = crashed(&format!("it was on its way when {} processes ended", in_flight.deaths()));
+        return stop(in_flight, facts, reason.into(), next);
     }
-    hand_on(&next.apart, Apart { travel, report, hash });
+    hand_on(&next.apart, Apart { in_flight, facts, hash });
 }
 
-fn stop(travel: Arc<Travel>, report: Report, why: Stopped, next: &Next) {
-    hand_on(&next.finished, Finished::Stopped(travel, Box::new(report), why));
+fn stop(in_flight: Arc<InFlight>, facts: Facts, why: Abort, next: &Next) {
+    hand_on(&next.finished, Finished::Abort(in_flight, Box::new(facts), why));
 }
 
 /// Why an input of which planish has died is put aside.
@@ -174,16 +175,16 @@ pub(super) fn crashed(how: &str) -> Reason {
 }
 
 /// The system got in the way: the input itself may be all right.
-pub(super) fn again(travel: &Travel, reason: Reason) {
-    let _in_stage = travel.in_stage(Stage::Read);
+pub(super) fn again(in_flight: &InFlight, reason: Reason) {
+    let _in_stage = in_flight.in_stage(Stage::Read);
     tracing::warn!("{}; it is tried again", reason.message);
-    travel.end(End::Again(reason));
+    in_flight.end(End::Again(reason));
 }
 
 /// Tells where a file leaves open what its surface is.
-fn warn_of_doubts(travel: &Travel, notes: &Notes) {
+fn warn_of_doubts(in_flight: &InFlight, notes: &Notes) {
     if notes.polygons_doubtful > 0 {
-        let _in_stage = travel.in_stage(Stage::Read);
+        let _in_stage = in_flight.in_stage(Stage::Read);
         tracing::warn!(
             polygons = notes.polygons_doubtful,
             "polygons cross themselves, or are too intricate: the triangles they were cut into may fold; export the \
@@ -191,7 +192,7 @@ fn warn_of_doubts(travel: &Travel, notes: &Notes) {
         );
     }
     for remark in &notes.remarks {
-        let _in_stage = travel.in_stage(Stage::Read);
+        let _in_stage = in_flight.in_stage(Stage::Read);
         tracing::warn!("{remark}");
     }
 }

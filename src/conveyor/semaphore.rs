@@ -1,4 +1,4 @@
-//! The turnstile: no more computations at once than `--jobs` says.
+//! The semaphore: no more computations at once than `--jobs` says.
 //!
 //! Whoever computes has gone through, and leaves before it waits for anything else: a full channel, memory, a disk. So
 //! those inside always move on, and nobody waits in a circle. Those who wait enter in the order of their turns; at its
@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Lets a number of computations in.
 #[derive(Debug)]
-pub struct Turnstile {
+pub struct PrioritySemaphore {
     state: Mutex<State>,
     moved: Condvar,
     /// The least turn that waits: a hint, read without the lock.
@@ -25,7 +25,7 @@ struct State {
     waiting: BTreeSet<(Turn, u64)>,
 }
 
-impl Turnstile {
+impl PrioritySemaphore {
     /// One that lets `places` computations in at once.
     pub fn new(places: usize) -> Self {
         let state = State { free: places, tickets: 0, waiting: BTreeSet::new() };
@@ -65,7 +65,7 @@ impl Turnstile {
     }
 
     /// Called from inside: lets those ahead of `turn` pass.
-    pub fn let_pass(&self, turn: Turn) {
+    pub fn yield_to(&self, turn: Turn) {
         if self.is_waited_for(turn) {
             // In one step, so that none of those behind slips in before.
             let mut state = self.state.lock();
@@ -88,45 +88,45 @@ mod tests {
 
     #[test]
     fn never_more_inside_than_places() {
-        let (turnstile, inside, most) = (Turnstile::new(3), AtomicUsize::new(0), AtomicUsize::new(0));
+        let (semaphore, inside, most) = (PrioritySemaphore::new(3), AtomicUsize::new(0), AtomicUsize::new(0));
         std::thread::scope(|s| {
             for turn in 0..12 {
-                let (turnstile, inside, most) = (&turnstile, &inside, &most);
+                let (semaphore, inside, most) = (&semaphore, &inside, &most);
                 s.spawn(move || {
                     for _ in 0..200 {
-                        turnstile.enter(turn);
+                        semaphore.enter(turn);
                         most.fetch_max(inside.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
                         inside.fetch_sub(1, Ordering::SeqCst);
-                        turnstile.let_pass(turn);
-                        turnstile.leave();
+                        semaphore.yield_to(turn);
+                        semaphore.leave();
                     }
                 });
             }
         });
         assert!((1..=3).contains(&most.into_inner()));
-        assert_eq!(turnstile.state.lock().free, 3);
+        assert_eq!(semaphore.state.lock().free, 3);
     }
 
     #[test]
     fn who_is_ahead_passes_at_a_safe_point() {
-        let turnstile = Turnstile::new(1);
+        let semaphore = PrioritySemaphore::new(1);
         let order = Mutex::new(Vec::new());
-        turnstile.enter(50);
+        semaphore.enter(50);
         std::thread::scope(|s| {
             for turn in [90, 10, 70] {
-                let (turnstile, order) = (&turnstile, &order);
+                let (semaphore, order) = (&semaphore, &order);
                 s.spawn(move || {
-                    turnstile.enter(turn);
+                    semaphore.enter(turn);
                     order.lock().push(turn);
-                    turnstile.leave();
+                    semaphore.leave();
                 });
             }
-            while turnstile.state.lock().waiting.len() < 3 {
+            while semaphore.state.lock().waiting.len() < 3 {
                 std::thread::yield_now();
             }
-            turnstile.let_pass(50);
+            semaphore.yield_to(50);
             order.lock().push(50);
-            turnstile.leave();
+            semaphore.leave();
         });
         assert_eq!(order.into_inner(), [10, 50, 70, 90]);
     }

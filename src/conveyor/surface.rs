@@ -1,8 +1,8 @@
 //! A surface whose charts are on their way: they are put together when the last one is in.
 
-use super::in_flight::Travel;
-use crate::outcome::Stopped;
-use crate::report::Report;
+use super::in_flight::InFlight;
+use crate::outcome::Abort;
+use crate::report::Facts;
 use parking_lot::Mutex;
 use planish_core::CertifiedChart;
 use planish_core::mesh::SurfaceMesh;
@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The place of a part among the others: that of its chart, and which part of it.
-pub(super) type Place = (usize, usize);
+pub(super) type PartIndex = (usize, usize);
 
 /// A surface that was cut into charts.
 pub(super) struct Surface {
-    pub travel: Arc<Travel>,
+    pub in_flight: Arc<InFlight>,
     /// How many charts decomposition made.
     pub whole: usize,
     parts: Mutex<Parts>,
@@ -22,40 +22,40 @@ pub(super) struct Surface {
 
 struct Parts {
     mesh: Option<SurfaceMesh>,
-    report: Report,
+    facts: Facts,
     missing: usize,
-    done: BTreeMap<Place, Vec<CertifiedChart>>,
-    stopped: Option<(Place, Stopped)>,
+    done: BTreeMap<PartIndex, Vec<CertifiedChart>>,
+    stopped: Option<(PartIndex, Abort)>,
 }
 
 impl Surface {
     /// A surface of which no chart is mapped yet.
-    pub fn new(travel: Arc<Travel>, mesh: SurfaceMesh, whole: usize, report: Report) -> Arc<Self> {
-        travel.shared.board.update(travel.number, |job| job.charts = whole);
-        let parts = Parts { mesh: Some(mesh), report, missing: whole, done: BTreeMap::new(), stopped: None };
-        Arc::new(Self { travel, whole, parts: Mutex::new(parts) })
+    pub fn new(in_flight: Arc<InFlight>, mesh: SurfaceMesh, whole: usize, facts: Facts) -> Arc<Self> {
+        in_flight.shared.progress.update(in_flight.number, |job| job.charts = whole);
+        let parts = Parts { mesh: Some(mesh), facts, missing: whole, done: BTreeMap::new(), stopped: None };
+        Arc::new(Self { in_flight, whole, parts: Mutex::new(parts) })
     }
 
-    /// Whether the part at `place` is still to be done. Where one of several parts stops the job, it is always the first
+    /// Whether the part at `part_index` is still to be done. Where one of several parts stops the job, it is always the first
     /// of those that would: so parts before it are done, and parts behind it are not.
-    pub fn is_due(&self, place: Place) -> bool {
-        self.parts.lock().stopped.as_ref().is_none_or(|(stopped, _)| place < *stopped)
+    pub fn is_pending(&self, part_index: PartIndex) -> bool {
+        self.parts.lock().stopped.as_ref().is_none_or(|(stopped, _)| part_index < *stopped)
     }
 
     /// A chart came as several parts instead of one.
     pub fn expect(&self, more: usize) {
         self.parts.lock().missing += more;
-        self.travel.shared.board.update(self.travel.number, |job| job.charts += more);
+        self.in_flight.shared.progress.update(self.in_flight.number, |job| job.charts += more);
     }
 
     /// A part is done, or stopped. Whether it was the last one.
-    pub fn deposit(&self, place: Place, part: Result<Vec<CertifiedChart>, Stopped>) -> bool {
-        self.travel.shared.board.update(self.travel.number, |job| job.charts_done += 1);
+    pub fn complete_part(&self, part_index: PartIndex, part: Result<Vec<CertifiedChart>, Abort>) -> bool {
+        self.in_flight.shared.progress.update(self.in_flight.number, |job| job.charts_done += 1);
         let mut parts = self.parts.lock();
         match part {
-            Ok(charts) => drop(parts.done.insert(place, charts)),
-            Err(why) if parts.stopped.as_ref().is_none_or(|(stopped, _)| place < *stopped) => {
-                parts.stopped = Some((place, why));
+            Ok(charts) => drop(parts.done.insert(part_index, charts)),
+            Err(why) if parts.stopped.as_ref().is_none_or(|(stopped, _)| part_index < *stopped) => {
+                parts.stopped = Some((part_index, why));
             }
             Err(_) => {}
         }
@@ -63,16 +63,16 @@ impl Surface {
         parts.missing == 0
     }
 
-    /// The report so far, and the surface with all charts in order, or why there are not all. Once: nothing is left here.
-    pub fn collect(&self) -> (Report, Result<(SurfaceMesh, Vec<CertifiedChart>), Stopped>) {
+    /// What is known so far, and the surface with all charts in order, or why there are not all. Once: nothing is left here.
+    pub fn collect(&self) -> (Facts, Result<(SurfaceMesh, Vec<CertifiedChart>), Abort>) {
         let mut parts = self.parts.lock();
         let done = std::mem::take(&mut parts.done).into_values().flatten().collect();
         let collected = match (parts.stopped.take(), parts.mesh.take()) {
             (None, Some(mesh)) => Ok((mesh, done)),
             (Some((_, why)), _) => Err(why),
-            (None, None) => Err(Stopped::Unwanted),
+            (None, None) => Err(Abort::Unwanted),
         };
-        (parts.report.clone(), collected)
+        (parts.facts.clone(), collected)
     }
 }
 
@@ -88,19 +88,19 @@ mod tests {
     #[test]
     fn the_first_part_that_stops_a_job_is_the_reason_in_any_order() {
         let (shared, _ended, _out) = shared(1 << 20);
-        let refusal = |place: Place| Stopped::For(Reason::new(Code::NeedsSplit, format!("{place:?}")));
-        let places = [(2, 0), (0, 1), (1, 0)];
+        let refusal = |part_index: PartIndex| Abort::For(Reason::new(Code::NeedsSplit, format!("{part_index:?}")));
+        let part_indices = [(2, 0), (0, 1), (1, 0)];
         for turn in 0..3 {
             let mesh = repair(&shapes::disk(2), &Default::default()).expect("a surface").mesh;
             let input = Input { name: "a.stl".to_owned(), bytes: None, blake3: None, beside: vec![] };
-            let surface = Surface::new(begin(&shared), mesh, 3, Report::new(input, &shared.settings()));
+            let surface = Surface::new(begin(&shared), mesh, 3, Facts::new(input));
             surface.expect(1);
-            let mut order = places;
+            let mut order = part_indices;
             order.rotate_left(turn);
-            assert!(!surface.deposit((0, 0), Ok(vec![])));
-            let last: Vec<bool> = order.iter().map(|p| surface.deposit(*p, Err(refusal(*p)))).collect();
+            assert!(!surface.complete_part((0, 0), Ok(vec![])));
+            let last: Vec<bool> = order.iter().map(|p| surface.complete_part(*p, Err(refusal(*p)))).collect();
             assert_eq!(last, [false, false, true]);
-            assert!(surface.is_due((0, 0)) && !surface.is_due((0, 2)));
+            assert!(surface.is_pending((0, 0)) && !surface.is_pending((0, 2)));
             assert_eq!(surface.collect().1.expect_err("stopped"), refusal((0, 1)));
         }
     }

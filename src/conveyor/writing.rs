@@ -1,10 +1,10 @@
 //! Putting results in their place, and trying again where the system gets in the way for a while.
 
 use super::completion::{Done, End};
-use super::in_flight::Travel;
+use super::in_flight::InFlight;
 use super::stage::Stage;
 use super::{Chained, Finished, log, published, unwritten};
-use crate::outcome::{Code, Reason, Stopped};
+use crate::outcome::{Abort, Code, Reason};
 use crate::output::publish::{self, PublishError, Publisher, Staged};
 use crate::report::Report;
 use crate::result_files;
@@ -36,7 +36,7 @@ impl Sink {
 
 /// A result, ready to be put in place.
 pub(super) struct Ready {
-    pub travel: Arc<Travel>,
+    pub in_flight: Arc<InFlight>,
     pub report: Report,
     pub content: Made,
 }
@@ -67,42 +67,41 @@ pub(super) struct After {
 
 /// Puts the charts of a surface together, and puts its result in place.
 pub(super) fn write(finished: Finished, after: &After) {
-    let (travel, mut report, files) = match finished {
-        Finished::Stopped(travel, report, why) => (travel, *report, Err(why)),
+    let (in_flight, facts, files) = match finished {
+        Finished::Abort(in_flight, facts, why) => (in_flight, *facts, Err(why)),
         Finished::Surface(surface) => {
-            let (mut report, done) = surface.collect();
-            let travel = surface.travel.clone();
-            let assembled = travel.compute(Stage::Write, |_| {
+            let (facts, done) = surface.collect();
+            let in_flight = surface.in_flight.clone();
+            let assembled = in_flight.compute(Stage::Write, |_| {
                 let (mesh, charts) = done?;
-                Ok(stages::assemble(mesh, charts, surface.whole, &travel.settings, &mut report)?)
+                let (certified, files) = stages::assemble(mesh, charts, surface.whole, &in_flight.settings)?;
+                let report = facts.clone().certified(&in_flight.settings, certified);
+                Ok((report, not_too_large(files, &in_flight)?))
             });
-            (travel, report, assembled)
+            (in_flight, facts, assembled)
         }
     };
-    let mut files = match files.and_then(|files| Ok(not_too_large(files, &travel)?)) {
-        Ok(files) => files,
-        Err(Stopped::Unwanted) => return travel.end(End::Unwanted),
-        Err(Stopped::For(reason)) => {
-            refuse(&mut report, reason);
-            Files::new()
-        }
+    let (mut report, mut files) = match files {
+        Ok(made) => made,
+        Err(Abort::Unwanted) => return in_flight.end(End::Unwanted),
+        Err(Abort::For(reason)) => (facts.stopped(&in_flight.settings, reason), Files::new()),
     };
-    report.timing = travel.timing();
+    report.timing = in_flight.timing();
     match report.to_json() {
         Ok(text) => {
             files.push((result_files::REPORT.to_owned(), text));
-            put(Ready { travel, report, content: Made::Files(files) }, after);
+            put(Ready { in_flight, report, content: Made::Files(files) }, after);
         }
         Err(error) => {
-            let _in_stage = travel.in_stage(Stage::Write);
-            unwritten(&travel, PublishError::Report(error));
+            let _in_stage = in_flight.in_stage(Stage::Write);
+            unwritten(&in_flight, PublishError::Report(error));
         }
     }
 }
 
 /// The files, unless they are too large together.
-fn not_too_large(files: Files, travel: &Travel) -> Result<Files, Reason> {
-    let (bytes, most) = (files.iter().map(|(_, content)| content.len() as u64).sum(), travel.settings.limits.result);
+fn not_too_large(files: Files, in_flight: &InFlight) -> Result<Files, Reason> {
+    let (bytes, most) = (files.iter().map(|(_, content)| content.len() as u64).sum(), in_flight.settings.limits.result);
     if bytes <= most {
         return Ok(files);
     }
@@ -116,25 +115,14 @@ fn not_too_large(files: Files, travel: &Travel) -> Result<Files, Reason> {
     ))
 }
 
-/// The report of an input that is refused, or failed.
-fn refuse(report: &mut Report, reason: Reason) {
-    report.status = reason.status();
-    // What a stage that broke down left in it is not to be trusted, nor that of a result that is not written.
-    report.refused_components.clear();
-    report.charts.clear();
-    report.outputs.clear();
-    report.hand_off = None;
-    report.reason = Some(reason);
-}
-
 /// Puts a result in place, or keeps it for later.
 pub(super) fn put(mut ready: Ready, after: &After) {
-    let travel = ready.travel.clone();
-    let _in_stage = travel.in_stage(Stage::Write);
+    let in_flight = ready.in_flight.clone();
+    let _in_stage = in_flight.in_stage(Stage::Write);
     match try_to_put(&mut ready) {
-        Err(error) if travel.shared.is_patient && ready.is_there() && !error.is_lasting() => {
+        Err(error) if in_flight.shared.is_patient && ready.is_there() && !error.is_lasting() => {
             tracing::error!("the result is kept, and put in place as soon as that can be: {error}");
-            travel.is_in_trouble(Some(error.to_string()));
+            in_flight.is_in_trouble(Some(error.to_string()));
             super::hand_on(&after.parked, ready);
         }
         ended => end(ready, ended, &after.chain),
@@ -142,23 +130,23 @@ pub(super) fn put(mut ready: Ready, after: &After) {
 }
 
 fn end(ready: Ready, ended: Result<bool, PublishError>, chain: &Sender<Chained>) {
-    let Ready { travel, report, .. } = ready;
+    let Ready { in_flight, report, .. } = ready;
     match ended {
         Ok(true) => {
-            if travel.shared.sink.publisher().is_some() {
+            if in_flight.shared.sink.publisher().is_some() {
                 log(&report);
             }
-            published(travel, Done { report, up_to_date: false }, chain);
+            published(in_flight, Done { report, up_to_date: false }, chain);
         }
-        Ok(false) => travel.end(if travel.job.is_wanted() { End::Changed } else { End::Unwanted }),
-        Err(error) => unwritten(&travel, error),
+        Ok(false) => in_flight.end(if in_flight.job.is_wanted() { End::Changed } else { End::Unwanted }),
+        Err(error) => unwritten(&in_flight, error),
     }
 }
 
 fn try_to_put(ready: &mut Ready) -> Result<bool, PublishError> {
-    let Ready { travel, content, .. } = ready;
-    let wanted = || travel.job.is_wanted() && travel.job.is_unchanged();
-    let publisher = match &travel.shared.sink {
+    let Ready { in_flight, content, .. } = ready;
+    let wanted = || in_flight.job.is_wanted() && in_flight.job.is_unchanged();
+    let publisher = match &in_flight.shared.sink {
         Sink::Out(publisher) => publisher,
         Sink::Folder(folder) => {
             let Made::Files(files) = content else { return Ok(false) };
@@ -166,8 +154,8 @@ fn try_to_put(ready: &mut Ready) -> Result<bool, PublishError> {
         }
     };
     match content {
-        Made::Files(files) => publisher.publish(&travel.job.name, files, wanted),
-        Made::Staged(staged) => publisher.put(&travel.job.name, staged, wanted),
+        Made::Files(files) => publisher.publish(&in_flight.job.name, files, wanted),
+        Made::Staged(staged) => publisher.put(&in_flight.job.name, staged, wanted),
     }
 }
 
@@ -190,20 +178,20 @@ fn look_at(
     (mut ready, failures, then): (Ready, u32, Instant),
     chain: &Sender<Chained>,
 ) -> Option<(Ready, u32, Instant)> {
-    let travel = ready.travel.clone();
-    let is_wanted = travel.job.is_wanted();
+    let in_flight = ready.in_flight.clone();
+    let is_wanted = in_flight.job.is_wanted();
     if is_wanted && Instant::now() < then {
         return Some((ready, failures, then));
     }
-    let _in_stage = travel.in_stage(Stage::Write);
+    let _in_stage = in_flight.in_stage(Stage::Write);
     match try_to_put(&mut ready) {
         Err(error) if is_wanted && ready.is_there() && !error.is_lasting() => {
             tracing::debug!(failures, "the result is still not written: {error}");
-            travel.is_in_trouble(Some(error.to_string()));
+            in_flight.is_in_trouble(Some(error.to_string()));
             Some((ready, failures + 1, Instant::now() + passing::pause(failures + 1)))
         }
         ended => {
-            travel.is_in_trouble(None);
+            in_flight.is_in_trouble(None);
             end(ready, ended, chain);
             None
         }

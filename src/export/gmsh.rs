@@ -1,7 +1,7 @@
 //! The hand-off to Gmsh: `atlas.msh` and `remesh.geo`, with the edge length that the script asks for.
 
 use crate::formats::gmsh;
-use crate::report::HandOff;
+use crate::report::ExportReport;
 use planish_core::atlas::{Chart, NARROW};
 use planish_core::evaluate::Plane;
 use planish_core::map::natural::{Natural, natural};
@@ -58,19 +58,19 @@ const SEARCHED: f64 = 0.1;
 
 /// The files of a hand-off, and the account of it.
 #[derive(Debug)]
-pub struct HandedOff {
+pub struct Export {
     /// Names and contents; none where the hand-off failed.
     pub files: Vec<(String, Vec<u8>)>,
     /// What the report says.
-    pub report: HandOff,
+    pub report: ExportReport,
 }
 
 /// Hands an atlas to Gmsh, for triangles with edges of length `size`. Warns where Gmsh would do badly; a hand-off that fails
 /// is told and leaves the maps as they are.
-pub fn gmsh(atlas: &CertifiedAtlas, size: f64) -> HandedOff {
+pub fn gmsh(atlas: &CertifiedAtlas, size: f64) -> Export {
     let (mesh, charts, network) = (atlas.mesh(), atlas.charts(), atlas.seams());
     let shortest_seam_distance = network.shortest_distance(mesh);
-    let mut report = HandOff { size, shortest_seam_distance, ..HandOff::default() };
+    let mut report = ExportReport { size, shortest_seam_distance, ..ExportReport::default() };
     report.warning = shortest_seam_distance.filter(|d| size > 0.5 * d).map(|d| too_coarse(size, d));
     let natural = natural_maps(charts);
     let straight: Vec<_> = natural.iter().map(|n| n.as_ref().map(|n| &n.map)).collect();
@@ -79,7 +79,7 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64) -> HandedOff {
         Err(error) => {
             let failure = failure(&error, charts);
             tracing::warn!("no hand-off to Gmsh: {failure}");
-            return HandedOff { files: vec![], report: HandOff { failure: Some(failure), ..report } };
+            return Export { files: vec![], report: ExportReport { failure: Some(failure), ..report } };
         }
     };
     let mut distortions: Vec<Summary> = charts.iter().map(|c| *c.distortion()).collect();
@@ -90,7 +90,7 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64) -> HandedOff {
     let narrow = narrow(charts, network, &algorithms.adapted, size);
     let mut spikes = spikes(mesh, charts, linear.curvatures(), size);
     let narrow_curves = narrow.iter().map(|n| n.curves.len()).sum();
-    let mut report = HandOff { narrow_curves, spikes: spikes.len(), ..counted(report, &linear, &algorithms) };
+    let mut report = ExportReport { narrow_curves, spikes: spikes.len(), ..counted(report, &linear, &algorithms) };
     if spikes.len() > MOST_SPIKES {
         report.warning.get_or_insert_with(|| too_coarse_for_spikes(size, spikes.len()));
         spikes.truncate(MOST_SPIKES);
@@ -100,7 +100,7 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64) -> HandedOff {
     }
     let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
     let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow, spikes };
-    HandedOff { files: files(atlas, &linear, &script), report }
+    Export { files: files(atlas, &linear, &script), report }
 }
 
 /// Maps with a boundary of their own for the charts whose maps stretch, where these do less.
@@ -237,8 +237,8 @@ fn files(atlas: &CertifiedAtlas, linear: &LinearAtlas, script: &gmsh::Script) ->
     files
 }
 
-fn counted(report: HandOff, linear: &LinearAtlas, algorithms: &gmsh::Algorithms) -> HandOff {
-    HandOff {
+fn counted(report: ExportReport, linear: &LinearAtlas, algorithms: &gmsh::Algorithms) -> ExportReport {
+    ExportReport {
         adapted_charts: algorithms.adapted.iter().map(|c| *c as u32).collect(),
         enlarged: algorithms.enlarged,
         sub_triangles: linear.triangle_count(),
@@ -290,7 +290,7 @@ fn failure(error: &subdivide::Error, charts: &[CertifiedChart]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::Said;
+    use crate::settings::RawSettings;
 
     #[test]
     fn an_edge_length_is_advised_only_where_it_is_taken() {
@@ -299,7 +299,7 @@ mod tests {
             let advised = message.split_once("--size ").and_then(|(_, rest)| rest.split(' ').next());
             let size: Option<f64> = advised.map(|a| a.parse().expect("a number"));
             assert!(size.is_none_or(|s| s < 0.5 * distance), "{message}");
-            assert!(Said { size, ..Said::default() }.check().is_ok(), "{message}");
+            assert!(RawSettings { size, ..RawSettings::default() }.check().is_ok(), "{message}");
             assert_eq!(size.is_some(), distance > 1e-310, "{message}");
         }
     }

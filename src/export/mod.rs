@@ -1,3 +1,5 @@
 //! What a mesher gets of a certified atlas: sizes, names, parts. How that is encoded is a matter of [`crate::formats`].
 
-pub mod gmsh;
+mod gmsh;
+
+pub use gmsh::{Export, gmsh};

@@ -19,11 +19,11 @@ pub struct Source<'a> {
     /// What is too much.
     pub limits: &'a Limits,
     /// The files beside it.
-    pub beside: &'a dyn Beside,
+    pub beside: &'a dyn SiblingFiles,
 }
 
 /// Gives the bytes of a file that lies beside the one that is read.
-pub trait Beside {
+pub trait SiblingFiles {
     /// The bytes of the file `name`, which is a plain name (no folder, no scheme), of at most `most` bytes.
     ///
     /// # Errors
@@ -33,9 +33,9 @@ pub trait Beside {
 
 /// Nothing lies beside the file.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Nothing;
+pub struct NoSiblings;
 
-impl Beside for Nothing {
+impl SiblingFiles for NoSiblings {
     fn read(&self, name: &str, _most: u64) -> Result<Vec<u8>, String> {
         Err(format!("there is no file {name} beside it"))
     }

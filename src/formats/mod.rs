@@ -23,7 +23,7 @@ mod words;
 
 use crate::outcome::{Code, Reason};
 pub use crate::settings::Limits;
-pub use content::{Beside, Content, Notes, Nothing, Source, TooMany};
+pub use content::{Content, NoSiblings, Notes, SiblingFiles, Source, TooMany};
 pub use patches::Patches;
 use place::Place;
 use planish_core::mesh::SoupError;
@@ -347,7 +347,7 @@ pub fn read_patches(format: Format, source: &Source) -> Result<Patches, ReadErro
 /// # Errors
 /// As [`read`].
 pub fn read_alone(format: Format, bytes: &[u8]) -> Result<Content, ReadError> {
-    read(format, &Source { bytes, limits: &Limits::default(), beside: &Nothing })
+    read(format, &Source { bytes, limits: &Limits::default(), beside: &NoSiblings })
 }
 
 #[cfg(test)]

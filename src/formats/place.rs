@@ -27,6 +27,6 @@ impl std::fmt::Display for Place {
 }
 
 /// A word of a file as it may be shown: short, printable.
-pub(super) fn shown(word: &[u8]) -> String {
+pub(super) fn escape(word: &[u8]) -> String {
     String::from_utf8_lossy(&word[..word.len().min(40)]).escape_debug().to_string()
 }

@@ -1,6 +1,6 @@
 //! The words of a text file, without a copy of any.
 
-use super::place::shown;
+use super::place::escape;
 
 /// What is left of a text, and the number of its line. Lines end with a line feed, a carriage return, or both.
 #[derive(Clone, Copy)]
@@ -127,7 +127,7 @@ fn is_undefined(word: &[u8]) -> bool {
 
 /// That a word is no number, and how it could become one.
 pub(super) fn no_number(word: &[u8]) -> String {
-    format!("\"{}\" is no number{}", shown(word), remedy(word))
+    format!("\"{}\" is no number{}", escape(word), remedy(word))
 }
 
 /// What follows where it is told that a word is no number: how it could become one, if that is known.

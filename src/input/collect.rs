@@ -2,14 +2,14 @@
 
 use crate::formats::{Kind, kind};
 use crate::input::job::Job;
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use std::path::{Path, PathBuf};
 
 /// Why inputs are refused as a whole: wrong usage.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// A folder cannot be listed.
-    #[error("cannot list {}: {error}", shown(.path))]
+    #[error("cannot list {}: {error}", escape(.path))]
     Unreadable {
         /// The path.
         path: PathBuf,
@@ -17,18 +17,18 @@ pub enum InputError {
         error: std::io::Error,
     },
     /// A folder holds no mesh.
-    #[error("the folder {} holds no mesh file; name a file or another folder", shown(.0))]
+    #[error("the folder {} holds no mesh file; name a file or another folder", escape(.0))]
     EmptyFolder(PathBuf),
     /// A path does not end in a name.
-    #[error("{} does not name a file", shown(.0))]
+    #[error("{} does not name a file", escape(.0))]
     NoName(PathBuf),
     /// An input lies in the output folder itself.
-    #[error("{} lies in the output folder, where its result would take its place; use another output folder", shown(.0))]
+    #[error("{} lies in the output folder, where its result would take its place; use another output folder", escape(.0))]
     InsideOut(PathBuf),
     /// Two inputs have the same name.
     #[error(
         "{} and {} have the same name, so that their results would overwrite each other; rename one, or use two output folders",
-        shown(.0), shown(.1)
+        escape(.0), escape(.1)
     )]
     SameName(PathBuf, PathBuf),
 }
@@ -93,7 +93,7 @@ fn folder(path: &Path) -> Result<Vec<Job>, InputError> {
         if mesh {
             files.push(file);
         } else {
-            tracing::info!(file = shown(&file), "passed over: no mesh");
+            tracing::info!(file = escape(&file), "passed over: no mesh");
         }
     }
     if files.is_empty() {

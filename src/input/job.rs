@@ -1,6 +1,6 @@
 //! One input as it travels: which file, under which name, and whether it is still wanted.
 
-use crate::system::fingerprint::Look;
+use crate::system::fingerprint::Fingerprint;
 use crate::system::safe_open::{self, OpenError};
 use blake3::Hash;
 use parking_lot::Mutex;
@@ -19,7 +19,7 @@ pub struct Job {
     /// Its size as it was seen, for the order among jobs.
     pub bytes: u64,
     /// What the file must look like; nothing where it could not be looked at.
-    pub look: Option<Look>,
+    pub look: Option<Fingerprint>,
     /// Since when it looks like that, where it lies in an inbox.
     pub since: Option<Instant>,
     /// The folder out of which no link may lead; none where the user named the file itself.
@@ -40,7 +40,7 @@ impl Job {
     /// The job for a file that is named: its result has its name.
     pub fn of_file(path: PathBuf) -> Self {
         let name = path.file_name().map(PathBuf::from).unwrap_or_default();
-        let look = Look::at(&path).ok().flatten();
+        let look = Fingerprint::at(&path).ok().flatten();
         Self { look, ..Self::new(path, name, look.map_or(0, |look| look.bytes)) }
     }
 
@@ -50,7 +50,7 @@ impl Job {
     }
 
     /// The job for a file that was seen in the folder `inbox` under the relative path `name`, and has not changed `since`.
-    pub fn of_inbox(inbox: &Path, name: &Path, look: Look, since: Instant) -> Self {
+    pub fn of_inbox(inbox: &Path, name: &Path, look: Fingerprint, since: Instant) -> Self {
         let (path, look, since, within) = (inbox.join(name), Some(look), Some(since), Some(inbox.to_owned()));
         Self { since, within, look, ..Self::new(path, name.to_owned(), look.map_or(0, |look| look.bytes)) }
     }
@@ -93,6 +93,6 @@ impl Job {
 
     /// Whether the file still is what was seen; always, where nothing was.
     pub fn is_unchanged(&self) -> bool {
-        self.look.is_none_or(|seen| Look::at(&self.path).is_ok_and(|now| now == Some(seen)))
+        self.look.is_none_or(|seen| Fingerprint::at(&self.path).is_ok_and(|now| now == Some(seen)))
     }
 }

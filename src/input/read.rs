@@ -3,7 +3,7 @@
 use super::job::Job;
 use crate::outcome::{Code, Reason};
 use crate::settings::Settings;
-use crate::system::fingerprint::Look;
+use crate::system::fingerprint::Fingerprint;
 use crate::system::passing;
 use crate::system::safe_open::{self, OpenError};
 use std::fs::File;
@@ -43,7 +43,7 @@ pub fn hash_input(job: &Job, settings: &Settings) -> Result<(blake3::Hash, u64),
 
 fn open_input(job: &Job) -> Result<File, Unread> {
     let file = job.open()?;
-    let is_seen = |seen: &Look| file.metadata().is_ok_and(|m| Look::of(&m) == *seen);
+    let is_seen = |seen: &Fingerprint| file.metadata().is_ok_and(|m| Fingerprint::of(&m) == *seen);
     if job.look.as_ref().is_none_or(is_seen) {
         return Ok(file);
     }

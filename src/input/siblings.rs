@@ -1,7 +1,7 @@
 //! The files beside an input, which its format names: those that were asked for, and what was read of them.
 
 use super::job::Job;
-use crate::formats::Beside;
+use crate::formats::SiblingFiles;
 use crate::report::Output;
 use crate::system::safe_open;
 use std::cell::RefCell;
@@ -54,7 +54,7 @@ impl<'a> Folder<'a> {
     }
 }
 
-impl Beside for Folder<'_> {
+impl SiblingFiles for Folder<'_> {
     fn read(&self, name: &str, most: u64) -> Result<Vec<u8>, String> {
         let bytes = self.bytes(name, most);
         let read = bytes.as_ref().ok().map(|bytes| Output::of(name, bytes));

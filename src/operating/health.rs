@@ -4,7 +4,7 @@
 //! so that each fact is tested with its twin.
 
 use crate::operating::status::Status;
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use bytesize::ByteSize;
 use serde::Serialize;
 use std::path::Path;
@@ -29,7 +29,7 @@ pub struct Fact {
 impl std::fmt::Display for Fact {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let verdict = if self.good { "good" } else { "BAD" };
-        write!(f, "{verdict:5} {:12} {}", self.about, shown(self.message.as_ref()))
+        write!(f, "{verdict:5} {:12} {}", self.about, escape(self.message.as_ref()))
     }
 }
 

@@ -63,7 +63,7 @@ impl Metrics {
         if let Err(error) = &written
             && self.is_written
         {
-            tracing::warn!(file = crate::system::escape::shown(&self.path), "the metrics cannot be written: {error}");
+            tracing::warn!(file = crate::system::escape::escape(&self.path), "the metrics cannot be written: {error}");
         }
         self.is_written = written.is_ok();
     }

@@ -50,11 +50,11 @@ fn keep<T: Clone + PartialEq>(name: &'static str, in_force: &T, asked: &mut T, l
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::{Inputs, Said};
+    use crate::settings::{Inputs, RawSettings};
     use planish_core::Order;
 
     fn settings(toml: &str) -> Settings {
-        toml::from_str::<Said>(toml).expect("well-formed").check().expect("in range")
+        toml::from_str::<RawSettings>(toml).expect("well-formed").check().expect("in range")
     }
 
     const OLD: &str = "jobs = 1\nout = \"a\"\n";

@@ -7,7 +7,7 @@ use crate::outcome::{Code, Status as Outcome};
 use crate::output::own;
 use crate::output::publish::STAGING;
 use crate::system::disk::{self, Disk, File as _, System};
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use crate::system::fingerprint::Identity;
 use crate::system::safe_open::{self, OpenError};
 use serde::{Deserialize, Serialize};
@@ -102,7 +102,7 @@ impl Status {
         if let Some(error) = &self.last_error {
             line += &format!("; last error: {}", error.message);
         }
-        shown(line.as_ref())
+        escape(line.as_ref())
     }
 }
 
@@ -203,7 +203,7 @@ pub struct Refusal {
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Another one has it.
-    #[error("another planish watch{} writes to {} already; stop it first, or use another output folder", of_process(.pid), shown(.out))]
+    #[error("another planish watch{} writes to {} already; stop it first, or use another output folder", of_process(.pid), escape(.out))]
     Busy {
         /// The output folder.
         out: PathBuf,
@@ -211,7 +211,7 @@ pub enum LockError {
         pid: Option<u32>,
     },
     /// The system refuses.
-    #[error("cannot lock {}: {error}", shown(.path))]
+    #[error("cannot lock {}: {error}", escape(.path))]
     Io {
         /// The lock file.
         path: PathBuf,

@@ -15,7 +15,7 @@
 use crate::output::own;
 use crate::output::publish::STAGING;
 use crate::system::disk::{self, Disk, File as _, System};
-use crate::system::fingerprint::Look;
+use crate::system::fingerprint::Fingerprint;
 use crate::system::safe_open;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
@@ -48,7 +48,7 @@ pub struct Entry {
     /// Its name, for people.
     name: String,
     /// What it looked like: newer content has done nothing yet.
-    look: Option<Look>,
+    look: Option<Fingerprint>,
     /// The version of planish: another one may not die.
     planish: String,
     /// Since when the machine runs, in the system's words.
@@ -58,7 +58,7 @@ pub struct Entry {
 }
 
 impl Entry {
-    fn of(name: &Path, look: Option<Look>) -> Self {
+    fn of(name: &Path, look: Option<Fingerprint>) -> Self {
         let version = env!("CARGO_PKG_VERSION").to_owned();
         Self { name: name.to_string_lossy().into_owned(), look, planish: version, boot: boot(), deaths: 0 }
     }
@@ -95,7 +95,7 @@ impl Begun {
     }
 
     /// What is known of an input; its mark will be in the folder `staging` of this process.
-    pub fn about(&self, name: &Path, look: Option<Look>, staging: &Path) -> Suspect {
+    pub fn about(&self, name: &Path, look: Option<Fingerprint>, staging: &Path) -> Suspect {
         let mut entry = Entry::of(name, look);
         let record = self.deaths.join(file(name));
         match read(&record) {
@@ -216,7 +216,7 @@ fn take_over_one(staging: &Path, path: &Path) -> io::Result<()> {
     }
     entry.deaths += 1;
     tracing::warn!(
-        input = crate::system::escape::shown(entry.name.as_ref()),
+        input = crate::system::escape::escape(entry.name.as_ref()),
         deaths = entry.deaths,
         "was on its way when the last planish died: it is done in a process of its own"
     );
@@ -269,7 +269,7 @@ mod tests {
         }
 
         /// What a process knows of an input, which will perhaps die of it.
-        fn about(&self, run: &str, name: &str, look: Option<Look>) -> Suspect {
+        fn about(&self, run: &str, name: &str, look: Option<Fingerprint>) -> Suspect {
             let folder = self.staging().join(run);
             fs::create_dir_all(&folder).expect("made");
             Begun::new(self.out.path()).about(name.as_ref(), look, &folder)
@@ -313,7 +313,7 @@ mod tests {
         place.die("run-1", "a.stl");
         let file = place.out.path().join("a.stl");
         fs::write(&file, "newer").expect("written");
-        let look = Look::at(&file).expect("there");
+        let look = Fingerprint::at(&file).expect("there");
         assert_eq!(place.about("run-2", "a.stl", look).deaths(), 0);
         assert!(!place.staging().join(DEATHS).exists(), "nor does anything tell of the older one");
     }

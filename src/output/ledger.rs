@@ -1,32 +1,33 @@
 //! The ledger: which inputs are done. There is no other one than the published reports.
 
-use crate::input::{Folder as Beside, read_file};
+use crate::input::{Folder as Siblings, read_file};
 use crate::outcome::{Code, Reason, Status};
-use crate::report::{Input, Output, Report};
+use crate::report::{Input, Output, Report, SCHEMA, VERSION};
 use crate::result_files;
+use crate::settings::Settings;
 use crate::system::disk::{Disk, File, Folder, System};
 use crate::system::safe_open::{self, OpenError};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use walkdir::{DirEntry, WalkDir};
 
-/// The report published in `folder`, if it is that of the same content, settings and version as `fresh`, of a file and
-/// those `beside` it, and its files are there, unharmed. A failure is none: another version may do better, or another
+/// The report published in `folder`, if it is that of this version, of an `input` of the same content with the same
+/// `settings`, and of the files `beside` it, and its files are there, unharmed. A failure is none: another version may do better, or another
 /// day; but planish does not die twice of the same. Nor is a refusal for a limit, which may have been raised since.
-pub fn up_to_date(folder: &Path, fresh: &Report, beside: &Beside) -> Option<Report> {
-    up_to_date_in(&System.open(folder).ok()?, fresh, beside)
+pub fn up_to_date(folder: &Path, input: &Input, settings: &Settings, beside: &Siblings) -> Option<Report> {
+    up_to_date_in(&System.open(folder).ok()?, input, settings, beside)
 }
 
 /// As [`up_to_date`], in an open folder.
-pub fn up_to_date_in<F: Folder>(folder: &F, fresh: &Report, beside: &Beside) -> Option<Report> {
+pub fn up_to_date_in<F: Folder>(folder: &F, input: &Input, settings: &Settings, beside: &Siblings) -> Option<Report> {
     let text = folder.follow_file(result_files::REPORT).and_then(|file| safe_open::read(&file, u64::MAX));
     let older: Report = serde_json::from_slice(&text.ok()?).ok()?;
-    let same = Input { beside: vec![], ..older.input.clone() } == fresh.input
-        && fresh.input.blake3.is_some()
+    let same = Input { beside: vec![], ..older.input.clone() } == *input
+        && input.blake3.is_some()
         // The same content names the same files beside it.
         && older.input.beside.iter().all(|read| beside.still_has(read))
-        && older.settings == fresh.settings
-        && (older.schema, &older.planish) == (fresh.schema, &fresh.planish)
+        && older.settings == settings.into()
+        && (older.schema, older.planish.as_str()) == (SCHEMA, VERSION)
         && is_final(&older);
     let there = |o: &Output| holds_in(folder, o).is_ok_and(|it_does| it_does);
     let complete = (older.status == Status::Certified) != older.outputs.is_empty();

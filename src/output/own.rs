@@ -110,7 +110,7 @@ pub fn lock(file: &impl File, path: &Path, patience: Duration, wanted: impl Fn()
             return Ok(false);
         }
         if began.elapsed() > Duration::from_secs(1) && !std::mem::replace(&mut is_told, true) {
-            tracing::warn!(lock = crate::system::escape::shown(path), "waits for a lock that another process holds");
+            tracing::warn!(lock = crate::system::escape::escape(path), "waits for a lock that another process holds");
         }
         std::thread::sleep(pause);
         pause = PAUSE.min(2 * pause);

@@ -11,7 +11,7 @@
 use crate::output::begun;
 use crate::output::withdraw::Standing;
 use crate::result_files;
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -82,7 +82,7 @@ fn is_gone(path: &Path) -> bool {
 
 fn remove(out: &Path, name: &Path) {
     let Ok(standing) = Standing::find(out, name) else { return };
-    let result = shown(name);
+    let result = escape(name);
     match standing.remove() {
         Ok(true) => {
             // Who comes back is innocent.

@@ -15,7 +15,7 @@ use crate::output::publish::{Content, PublishError, STAGING, at};
 use crate::output::replace::{self, NotKept};
 use crate::result_files;
 use crate::system::disk::{self, Disk, File as _, Folder, OPEN_FILE, OPEN_FOLDER, Rename};
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::io::{self, ErrorKind};
@@ -155,7 +155,7 @@ fn clear_stale<D: Disk>(disk: &D, out: &Path, root: &D::Folder, bury: Bury) {
         let is_run = name.as_bytes().starts_with(RUN.as_bytes()) && root.stat_of(&name).is_ok_and(|s| s.is_folder());
         if is_run && let Err(error) = clear_one(disk, out, root, &name, bury) {
             let folder = out.join(STAGING).join(&name);
-            tracing::warn!(folder = shown(&folder), "an abandoned staging folder is left alone: {error}");
+            tracing::warn!(folder = escape(&folder), "an abandoned staging folder is left alone: {error}");
         }
     }
 }
@@ -288,7 +288,7 @@ impl<F: Folder> Desk<F> {
             NotKept::Io(path, error) => PublishError::Io { path, error },
         })?;
         if kept > 0 {
-            tracing::info!(result = shown(target), kept, "files that planish did not write stay in the result");
+            tracing::info!(result = escape(target), kept, "files that planish did not write stay in the result");
             fresh.sync().map_err(at(target))?;
         }
         Ok(())

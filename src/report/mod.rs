@@ -2,6 +2,7 @@
 //! grows.
 
 mod build;
+mod facts;
 pub mod mesh;
 mod warnings;
 
@@ -10,6 +11,7 @@ use crate::outcome::{Reason, Status};
 use crate::settings::{self, Settings};
 use crate::system::escape::printable_json;
 pub use build::{certificate, chart_checksum, charts, repairs, seams, surface};
+pub use facts::{CertifiedFacts, Facts, SurfaceFacts};
 use planish_core::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,6 +19,9 @@ pub use warnings::{Doubt, Warning, warnings};
 
 /// The version of the schema.
 pub const SCHEMA: u32 = 1;
+
+/// The version of planish, as reports tell it.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The whole report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,7 +56,7 @@ pub struct Report {
     /// The curves between charts.
     pub seams: Seams,
     /// The hand-off to a mesher; null where there was none to be made.
-    pub hand_off: Option<HandOff>,
+    pub hand_off: Option<ExportReport>,
     /// The other files of the result.
     pub outputs: Vec<Output>,
     /// CPU seconds per stage: the only part that differs from run to run.
@@ -88,7 +93,7 @@ pub struct ResultSettings {
     /// Largest number of triangles of a chart; null: any.
     pub max_triangles: Option<usize>,
     /// Mesher to which the result is handed.
-    pub hand_off: settings::HandOff,
+    pub hand_off: settings::ExportTarget,
     /// Edge length that was asked for; null for the default.
     pub size: Option<f64>,
 }
@@ -387,7 +392,7 @@ pub struct Seam {
 
 /// The hand-off to a mesher.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct HandOff {
+pub struct ExportReport {
     /// The edge length that it asks for.
     pub size: f64,
     /// Triangles of the linear triangulation.
@@ -454,7 +459,7 @@ impl Report {
     pub fn new(input: Input, settings: &Settings) -> Self {
         Self {
             schema: SCHEMA,
-            planish: env!("CARGO_PKG_VERSION").to_owned(),
+            planish: VERSION.to_owned(),
             input,
             settings: settings.into(),
             status: Status::Failed,

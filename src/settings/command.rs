@@ -1,6 +1,6 @@
 //! Commands that follow a result, checked: `[[on_certified]]` and `[[on_refused]]` of planish.toml.
 
-use super::CommandSaid;
+use super::RawCommand;
 use super::template::{Template, TemplateError};
 
 /// When commands run.
@@ -25,7 +25,7 @@ impl std::fmt::Display for Occasion {
 /// A command, checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hook {
-    configured: CommandSaid,
+    configured: RawCommand,
     arguments: Vec<Template>,
 }
 
@@ -58,8 +58,8 @@ impl Hook {
     ///
     /// # Errors
     /// [`HookRefused`] for what can never run.
-    pub fn new(configured: CommandSaid, occasion: Occasion) -> Result<Self, HookRefused> {
-        let CommandSaid { command, time_limit } = &configured;
+    pub fn new(configured: RawCommand, occasion: Occasion) -> Result<Self, HookRefused> {
+        let RawCommand { command, time_limit } = &configured;
         if !(*time_limit > 0.0 && time_limit.is_finite()) {
             return Err(HookRefused::TimeLimit(*time_limit));
         }
@@ -76,7 +76,7 @@ impl Hook {
     }
 
     /// The command as it is configured.
-    pub fn configured(&self) -> &CommandSaid {
+    pub fn configured(&self) -> &RawCommand {
         &self.configured
     }
 

@@ -5,7 +5,7 @@ mod limits;
 mod template;
 mod values;
 
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use crate::system::machine;
 use bytesize::ByteSize;
 pub use command::{Hook, HookRefused, Occasion};
@@ -15,13 +15,13 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 pub use template::{Part, Placeholder, Template, TemplateError};
-pub use values::{CommandSaid, FeatureAngle, HandOff, Inputs, LimitsSaid, Log, Off, Refused};
+pub use values::{ExportTarget, FeatureAngle, Inputs, Log, Off, RawCommand, RawLimits, Refused};
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
 /// the file alone.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Said {
+pub struct RawSettings {
     /// Folder for the results.
     pub out: Option<PathBuf>,
     /// Order of the elements: 1 or 2.
@@ -42,7 +42,7 @@ pub struct Said {
     pub max_triangles: Option<usize>,
     /// Meshers to which results are handed.
     #[serde(rename = "hand-off")]
-    pub hand_off: Option<HandOff>,
+    pub hand_off: Option<ExportTarget>,
     /// Edge length of the mesh to be made.
     pub size: Option<f64>,
     /// Process inputs whose output is up to date, too.
@@ -78,7 +78,7 @@ pub struct Said {
     #[serde(rename = "keep-results")]
     pub keep_results: Option<f64>,
     /// What is too much for one input.
-    pub limits: Option<LimitsSaid>,
+    pub limits: Option<RawLimits>,
     /// Form of log messages.
     pub log: Option<Log>,
     /// How much more to log: 1 informs, 2 explains, 3 traces.
@@ -86,9 +86,9 @@ pub struct Said {
     /// Print nothing but errors.
     pub quiet: Option<bool>,
     /// Commands that run after an input is certified, in their order.
-    pub on_certified: Option<Vec<CommandSaid>>,
+    pub on_certified: Option<Vec<RawCommand>>,
     /// Commands that run after an input is refused or failed, in their order.
-    pub on_refused: Option<Vec<CommandSaid>>,
+    pub on_refused: Option<Vec<RawCommand>>,
 }
 
 /// Checked settings.
@@ -109,7 +109,7 @@ pub struct Settings {
     /// Largest number of triangles of a chart; none: any.
     pub max_triangles: Option<usize>,
     /// Meshers to which results are handed.
-    pub hand_off: HandOff,
+    pub hand_off: ExportTarget,
     /// Edge length of the mesh to be made, in the unit of the input; without it, one is chosen.
     pub size: Option<f64>,
     /// Process inputs whose output is up to date, too.
@@ -223,7 +223,7 @@ pub enum SettingsError {
         error: HookRefused,
     },
     /// The file cannot be read.
-    #[error("cannot read the settings file {}: {error}", shown(.path))]
+    #[error("cannot read the settings file {}: {error}", escape(.path))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -231,7 +231,7 @@ pub enum SettingsError {
         error: std::io::Error,
     },
     /// The file makes no sense.
-    #[error("{}: {error}", shown(.path))]
+    #[error("{}: {error}", escape(.path))]
     Syntax {
         /// The file.
         path: PathBuf,
@@ -266,7 +266,7 @@ fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get).min(MOST_JOBS)
 }
 
-impl Said {
+impl RawSettings {
     /// Reads planish.toml.
     ///
     /// # Errors
@@ -408,7 +408,7 @@ fn kept_for(days: f64) -> Result<Duration, SettingsError> {
     }
 }
 
-fn hooks(said: Option<Vec<CommandSaid>>, occasion: Occasion) -> Result<Vec<Hook>, SettingsError> {
+fn hooks(said: Option<Vec<RawCommand>>, occasion: Occasion) -> Result<Vec<Hook>, SettingsError> {
     let check = |(i, command)| {
         Hook::new(command, occasion).map_err(|error| SettingsError::Command { occasion, table: i + 1, error })
     };

@@ -19,7 +19,7 @@ pub enum Log {
 /// The meshers to which results are handed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
-pub enum HandOff {
+pub enum ExportTarget {
     /// Gmsh: atlas.msh and remesh.geo.
     #[default]
     Gmsh,
@@ -124,7 +124,7 @@ impl TryFrom<String> for Refused {
 /// A command that runs on a result: a table `[[on_certified]]` or `[[on_refused]]` of planish.toml (see docs/hooks.md).
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CommandSaid {
+pub struct RawCommand {
     /// Program and arguments, with placeholders such as `{folder}`.
     pub command: Vec<String>,
     /// Wall-clock seconds after which it is ended; ten minutes where nothing is said.
@@ -139,7 +139,7 @@ fn ten_minutes() -> f64 {
 /// What is too much for one input: the table `[limits]` of planish.toml. Files may come from anyone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LimitsSaid {
+pub struct RawLimits {
     /// The size of a file, and of all that it takes along.
     pub file: Option<ByteSize>,
     /// Points, and triangles.
@@ -152,7 +152,7 @@ pub struct LimitsSaid {
     pub result: Option<ByteSize>,
 }
 
-impl LimitsSaid {
+impl RawLimits {
     /// What was said, and the defaults where nothing was.
     pub(super) fn or_default(self) -> Limits {
         let usual = Limits::default();

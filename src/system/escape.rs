@@ -8,7 +8,7 @@ use std::path::Path;
 const LONGEST: usize = 2000;
 
 /// A path, on one line and never that of another file: bytes that are no UTF-8 are told as `\xff`.
-pub fn shown(path: &Path) -> String {
+pub fn escape(path: &Path) -> String {
     let mut told = String::new();
     for chunk in path.as_os_str().as_encoded_bytes().utf8_chunks() {
         told += &escaped(chunk.valid(), &['\'', '"']);
@@ -70,7 +70,7 @@ mod tests {
             (r"\x41", r"\\x41"),
         ];
         for (name, told) in names {
-            assert_eq!(shown(name.as_ref()), told);
+            assert_eq!(escape(name.as_ref()), told);
         }
         assert_eq!(printable("unexpected \"\\u{1b}\"\n\u{1b}"), r#"unexpected "\u{1b}"\n\u{1b}"#);
         assert_eq!(printable_lines("a\n b\u{1b}\t"), "a\n b\\u{1b}\\t");
@@ -81,7 +81,7 @@ mod tests {
     #[test]
     fn names_that_differ_are_shown_differently() {
         use std::os::unix::ffi::OsStrExt;
-        let told = |bytes: &[u8]| shown(std::ffi::OsStr::from_bytes(bytes).as_ref());
+        let told = |bytes: &[u8]| escape(std::ffi::OsStr::from_bytes(bytes).as_ref());
         assert_eq!(
             [told(b"a\xff.stl"), told(b"a\xfe.stl"), told(b"a\\xff.stl")],
             ["a\\xff.stl", "a\\xfe.stl", "a\\\\xff.stl"]

@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// What a look at a regular file shows. Two looks differ where the file was written to, or another one took its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Look {
+pub struct Fingerprint {
     /// Its size in bytes.
     pub bytes: u64,
     identity: Identity,
@@ -50,7 +50,7 @@ impl Identity {
     }
 }
 
-impl Look {
+impl Fingerprint {
     /// Looks at a file.
     ///
     /// # Errors
@@ -97,18 +97,18 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let [path, other] = ["a.stl", "b.stl"].map(|n| folder.path().join(n));
         std::fs::write(&path, "one").expect("written");
-        let first = Look::at(&path).expect("there").expect("a file");
-        assert_eq!(Look::at(&path).expect("there"), Some(first));
+        let first = Fingerprint::at(&path).expect("there").expect("a file");
+        assert_eq!(Fingerprint::at(&path).expect("there"), Some(first));
         std::fs::write(&path, "three").expect("written");
-        let second = Look::at(&path).expect("there").expect("a file");
+        let second = Fingerprint::at(&path).expect("there").expect("a file");
         assert_ne!(first, second);
         std::fs::write(&other, "three").expect("written");
         std::fs::rename(&other, &path).expect("renamed");
-        let third = Look::at(&path).expect("there").expect("a file");
+        let third = Fingerprint::at(&path).expect("there").expect("a file");
         assert!(!second.is_renamed(&third) && third.bytes == 5);
         std::fs::rename(&path, &other).expect("renamed");
-        assert!(third.is_renamed(&Look::at(&other).expect("there").expect("a file")));
-        assert_eq!(Look::at(folder.path()).expect("there"), None);
-        assert!(Look::at(&path).is_err());
+        assert!(third.is_renamed(&Fingerprint::at(&other).expect("there").expect("a file")));
+        assert_eq!(Fingerprint::at(folder.path()).expect("there"), None);
+        assert!(Fingerprint::at(&path).is_err());
     }
 }

@@ -1,17 +1,17 @@
 //! Where folders lie to each other.
 
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// A folder with what it is for.
 #[derive(Clone, Copy, Debug)]
-pub struct Place<'a> {
+pub struct FolderRole<'a> {
     role: &'static str,
     path: &'a Path,
 }
 
-impl<'a> Place<'a> {
+impl<'a> FolderRole<'a> {
     /// The folder `path`, which need not be there yet.
     pub fn new(role: &'static str, path: &'a Path) -> Self {
         Self { role, path }
@@ -20,15 +20,15 @@ impl<'a> Place<'a> {
 
 /// Why folders are refused: wrong usage.
 #[derive(Debug, thiserror::Error)]
-pub enum PlaceError {
+pub enum FolderError {
     /// One lies in the other.
     #[error(
         "the {} {} and the {} {} lie in each other: what is written to one would be taken for what is dropped into the \
-         other; use two separate folders", .0.0, shown(&.0.1), .1.0, shown(&.1.1)
+         other; use two separate folders", .0.0, escape(&.0.1), .1.0, escape(&.1.1)
     )]
     Nested((&'static str, PathBuf), (&'static str, PathBuf)),
     /// A path leads nowhere.
-    #[error("the {role} {}: {error}", shown(.path))]
+    #[error("the {role} {}: {error}", escape(.path))]
     Unknown {
         /// What the folder is for.
         role: &'static str,
@@ -42,18 +42,18 @@ pub enum PlaceError {
 /// Refuses folders of which one lies in another, by whatever links or relative paths they are named.
 ///
 /// # Errors
-/// [`PlaceError`].
-pub fn refuse_nested(places: &[Place]) -> Result<(), PlaceError> {
-    let resolve = |p: &Place| {
+/// [`FolderError`].
+pub fn refuse_nested(places: &[FolderRole]) -> Result<(), FolderError> {
+    let resolve = |p: &FolderRole| {
         let resolved = resolved(p.path);
-        resolved.map_err(|error| PlaceError::Unknown { role: p.role, path: p.path.to_owned(), error })
+        resolved.map_err(|error| FolderError::Unknown { role: p.role, path: p.path.to_owned(), error })
     };
     let resolved = places.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
     for (i, a) in resolved.iter().enumerate() {
         for (j, b) in resolved.iter().enumerate() {
             if i != j && a.starts_with(b) {
                 let [inner, outer] = [i, j].map(|k| (places[k].role, places[k].path.to_owned()));
-                return Err(PlaceError::Nested(inner, outer));
+                return Err(FolderError::Nested(inner, outer));
             }
         }
     }
@@ -79,7 +79,10 @@ mod tests {
     use super::*;
 
     fn nested(a: &Path, b: &Path) -> bool {
-        matches!(refuse_nested(&[Place::new("inbox", a), Place::new("output folder", b)]), Err(PlaceError::Nested(..)))
+        matches!(
+            refuse_nested(&[FolderRole::new("inbox", a), FolderRole::new("output folder", b)]),
+            Err(FolderError::Nested(..))
+        )
     }
 
     #[test]

@@ -46,7 +46,7 @@ pub fn end_those_of(staging: &Path) {
 mod linux {
     use super::GRACE;
     use super::{SESSION, STAGING};
-    use crate::system::escape::shown;
+    use crate::system::escape::escape;
     use rustix::event::{PollFd, PollFlags, Timespec, poll};
     use rustix::fd::OwnedFd;
     use rustix::io::Errno;
@@ -89,7 +89,7 @@ mod linux {
             wait(&rest, DYING);
         }
         tracing::error!(
-            staging = shown(&staging),
+            staging = escape(&staging),
             "a command that planish has left running does not even end when it is killed: it may run twice now; find \
              it by {STAGING} in its environment (`ps eww`)"
         );

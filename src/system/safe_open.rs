@@ -5,7 +5,7 @@
 //! takes the place of a file, or of a folder on the way to it, after somebody has looked.
 
 use crate::system::disk::{self, Disk, System};
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use blake3::{Hash, Hasher};
 use rustix::fd::{AsFd, OwnedFd};
 use rustix::fs::{AtFlags, CWD, FileType, Mode, OFlags, openat, statat};
@@ -26,7 +26,7 @@ pub enum OpenError {
     #[error("it is no regular file")]
     NotRegular,
     /// It is a link that leads somewhere else.
-    #[error("it is a link that leads out of the folder {}: name the link itself, or copy the file", shown(.0))]
+    #[error("it is a link that leads out of the folder {}: name the link itself, or copy the file", escape(.0))]
     LeadsOut(PathBuf),
     /// It is too large.
     #[error("it has {size} bytes, more than {most}")]

@@ -5,14 +5,14 @@
 //! claims beyond that must agree with what is found. Checksums are a second, separate test: a map that is broken
 //! fails the first one even if all checksums were made anew.
 
-use super::{Exit, complain, say, shown};
+use super::{Exit, eprint_line, escape, say};
 use crate::formats::vtu::{self, Grid};
 use crate::input::read_file;
 use crate::outcome::{Reason, Status};
 use crate::output::ledger;
 use crate::report::{self, ChartReport, Report, certificate, chart_checksum};
 use crate::result_files;
-use crate::settings::HandOff;
+use crate::settings::ExportTarget;
 use crate::stages::guard;
 use planish_core::certify::{self, PlanarMap, prove};
 use planish_core::grid::GridPoint;
@@ -52,7 +52,7 @@ struct Findings {
 pub fn check(results: &[PathBuf], quiet: bool) -> Exit {
     let mut exit = Exit::Success;
     for path in results {
-        let name = shown(path);
+        let name = escape(path);
         let found = match folder(path) {
             Some(folder) => guard(|| Ok(check_one(folder))).unwrap_or_else(|broken: Reason| Findings {
                 wrong: vec![file(result_files::REPORT, broken.message)],
@@ -67,7 +67,7 @@ pub fn check(results: &[PathBuf], quiet: bool) -> Exit {
             found.proven.iter().for_each(|line| say(&format!("{name}: {line}")));
         }
         for finding in &found.wrong {
-            complain(&format!("{name}: not proven: {finding}"));
+            eprint_line(&format!("{name}: not proven: {finding}"));
             exit = Exit::Refused;
         }
     }
@@ -131,7 +131,7 @@ pub(super) fn read_report(folder: &Path) -> Result<Report, Finding> {
 /// Sizes and hashes of all files.
 fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
     let unlisted = |name: &&&str| !report.outputs.iter().any(|o| o.file == **name);
-    let asked_for = report.settings.hand_off == HandOff::Gmsh;
+    let asked_for = report.settings.hand_off == ExportTarget::Gmsh;
     let failed = report.hand_off.as_ref().is_some_and(|h| h.failure.is_some());
     let handed_off = HANDED_OFF.iter().filter(|_| asked_for && !failed);
     let is_enlarged = report.hand_off.as_ref().is_some_and(|h| h.enlarged != 1.0);

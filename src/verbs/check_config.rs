@@ -5,7 +5,7 @@
 //! permissions that planish needs, shows at the start.
 
 use super::watch::{destinations, no_inbox, refuse_metrics, refuse_nested, takes_inputs_out};
-use super::{Exit, complain, say, shown};
+use super::{Exit, eprint_line, escape, say};
 use crate::output::publish::STAGING;
 use crate::settings::{Hook, Settings};
 use rustix::fs::{Access, access};
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Says all that is wrong.
 pub fn check_config(inbox: &Path, out: &Path, settings: &Settings) -> Exit {
     let problems = problems(inbox, out, settings);
-    problems.iter().for_each(|problem| complain(problem));
+    problems.iter().for_each(|problem| eprint_line(problem));
     if !problems.is_empty() {
         return Exit::Usage;
     }
@@ -30,7 +30,7 @@ fn problems(inbox: &Path, out: &Path, settings: &Settings) -> Vec<String> {
     match std::fs::read_dir(inbox) {
         Err(error) => problems.push(no_inbox(inbox, &error)),
         Ok(_) if takes_inputs_out(settings) && !may_be_written(inbox) => {
-            problems.push(format!("inputs cannot leave the inbox {}: it may not be written", shown(inbox)));
+            problems.push(format!("inputs cannot leave the inbox {}: it may not be written", escape(inbox)));
         }
         Ok(_) => {}
     }
@@ -56,7 +56,7 @@ fn unwritable(role: &str, folder: &Path) -> Option<String> {
         return None;
     }
     let why = if there.is_dir() { "may not be written" } else { "is no folder" };
-    Some(format!("the {role} {} cannot be used: {} {why}", shown(folder), shown(there)))
+    Some(format!("the {role} {} cannot be used: {} {why}", escape(folder), escape(there)))
 }
 
 /// Why planish cannot keep what it needs in the output folder.
@@ -64,7 +64,7 @@ fn no_staging(out: &Path) -> Option<String> {
     let staging = out.join(STAGING);
     let there = staging.symlink_metadata().ok()?;
     let is_good = there.is_dir() && may_be_written(&staging);
-    (!is_good).then(|| format!("{} is no folder that planish may write", shown(&staging)))
+    (!is_good).then(|| format!("{} is no folder that planish may write", escape(&staging)))
 }
 
 /// What is said of a command whose program is not to be found. One that depends on the result is not looked for.
@@ -84,7 +84,7 @@ fn is_found(program: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::Said;
+    use crate::settings::RawSettings;
     use std::fs;
 
     struct Place {
@@ -99,7 +99,7 @@ mod tests {
         /// What is wrong with this file of settings, in which @ stands for this folder.
         fn problems(&self, out: &str, toml: &str) -> Vec<String> {
             let toml = toml.replace('@', self.folder.path().to_str().expect("UTF-8"));
-            let settings = toml::from_str::<Said>(&toml).expect("well-formed").check().expect("in range");
+            let settings = toml::from_str::<RawSettings>(&toml).expect("well-formed").check().expect("in range");
             problems(&self.at("in"), &self.at(out), &settings)
         }
     }

@@ -4,11 +4,11 @@
 //! What is found is told, and kept as mesh.json beside the report.
 
 use super::check::{folder, read_report};
-use super::{Exit, complain, say, say_json, shown};
+use super::{Exit, eprint_line, escape, say, say_json};
 use crate::cli;
 use crate::formats::gmsh;
 use crate::formats::vtu::{self, Shape};
-use crate::formats::{self, Kind, Nothing, Patches, READ, Source};
+use crate::formats::{self, Kind, NoSiblings, Patches, READ, Source};
 use crate::input::read_file_into;
 use crate::outcome::Reason;
 use crate::report::mesh::{MeshReport, PLACES};
@@ -73,20 +73,20 @@ pub fn check_mesh(
     if !(0.0..=1.0).contains(&question.min_gamma) {
         return Err("--min-gamma must lie between 0 and 1".into());
     }
-    let name = shown(&question.mesh);
+    let name = escape(&question.mesh);
     let judged = guard(|| {
         let folder = folder(result).ok_or("is neither a result folder nor a report.json".to_owned());
-        let folder = folder.map_err(|problem| Unjudged::Told(format!("{} {problem}", shown(result))));
+        let folder = folder.map_err(|problem| Unjudged::Told(format!("{} {problem}", escape(result))));
         Ok::<_, Reason>(folder.and_then(|folder| Ok((folder, judge(folder, question, settings)?))))
     });
     let (folder, report) = match judged {
         Ok(Ok(judged)) => judged,
         Ok(Err(unjudged)) => {
-            complain(&format!("{name}: not judged: {unjudged}"));
+            eprint_line(&format!("{name}: not judged: {unjudged}"));
             return Ok(Exit::Refused);
         }
         Err(broken) => {
-            complain(&format!("{name}: not judged: {}", broken.message));
+            eprint_line(&format!("{name}: not judged: {}", broken.message));
             return Ok(Exit::Refused);
         }
     };
@@ -96,11 +96,11 @@ pub fn check_mesh(
         say(&text(&name, &report));
     }
     if let Err(error) = keep(folder, &report) {
-        complain(&format!("{}: cannot be written: {error}", shown(&folder.join(result_files::MESH))));
+        eprint_line(&format!("{}: cannot be written: {error}", escape(&folder.join(result_files::MESH))));
         return Ok(Exit::Refused);
     }
     if !report.faithful {
-        complain(&format!("{name}: not faithful: {}", report.defects[0].message));
+        eprint_line(&format!("{name}: not faithful: {}", report.defects[0].message));
     }
     Ok(if report.faithful && report.fine { Exit::Success } else { Exit::Refused })
 }
@@ -171,7 +171,7 @@ fn decode(path: &Path, bytes: &[u8], settings: &Settings) -> Result<Patches, Rea
         let message = format!("the file name tells no mesh; name one of {READ}");
         return Err(Reason::new(crate::outcome::Code::UnknownExtension, message));
     };
-    let source = Source { bytes, limits: &settings.limits, beside: &Nothing };
+    let source = Source { bytes, limits: &settings.limits, beside: &NoSiblings };
     formats::read_patches(format, &source).map_err(|e| e.reason())
 }
 

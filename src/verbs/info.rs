@@ -1,6 +1,6 @@
 //! `planish info`: what is this surface?
 
-use super::{Exit, say, say_json, shown};
+use super::{Exit, escape, say, say_json};
 use crate::formats::{Content, Notes};
 use crate::input::job::Job;
 use crate::input::{self, Folder, decode, read_input};
@@ -91,7 +91,7 @@ fn answer(job: &Job, settings: &Settings) -> Answer {
 
 /// The answer for people.
 fn text(answer: &Answer, input: &Path) -> String {
-    let mut lines = vec![shown(input)];
+    let mut lines = vec![escape(input)];
     if let Some(reason) = &answer.reason {
         lines.push(format!("  refused: {} [{}]", reason.message, reason.code.name()));
     }

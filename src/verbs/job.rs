@@ -5,7 +5,7 @@ use crate::cli::Apart;
 use crate::conveyor::Conveyor;
 use crate::conveyor::apart::parent::Parent;
 use crate::conveyor::apart::protocol::{Ending, Order, Said, say};
-use crate::conveyor::completion::{End, Ended};
+use crate::conveyor::completion::{Completion, End};
 use crate::input::job::Job;
 use crate::outcome::{Code, Reason};
 use crate::output::begun;
@@ -88,7 +88,7 @@ fn job_of(asked: &Apart) -> Job {
 fn follow(conveyor: &Conveyor, parent: &Parent) -> End {
     let mut told = None;
     loop {
-        if let Some(Ended { end, .. }) = conveyor.next(TELL) {
+        if let Some(Completion { end, .. }) = conveyor.next(TELL) {
             return end;
         }
         let now = conveyor.running().pop().map(|job| (job.stage, job.charts_done, job.charts, job.trouble));

@@ -34,11 +34,11 @@ fn say_json(value: &impl serde::Serialize) -> serde_json::Result<()> {
 }
 
 /// Prints a line on standard error, where somebody reads it.
-pub fn complain(line: &str) {
+pub fn eprint_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "planish: {}", printable_lines(line));
 }
 
-use crate::system::escape::{printable_json, printable_lines, shown};
+use crate::system::escape::{escape, printable_json, printable_lines};
 
 /// Every verb says how it ended: the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

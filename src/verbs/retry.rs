@@ -1,7 +1,7 @@
 //! `planish retry`: results that are not certified are removed, so that their inputs are done again: by the daemon that
 //! runs, which looks for results that were removed, or by the next one.
 
-use super::{Exit, complain, say};
+use super::{Exit, eprint_line, say};
 use crate::operating::status;
 use crate::outcome::Status;
 use crate::output::begun;
@@ -9,7 +9,7 @@ use crate::output::ledger::Entry;
 use crate::output::withdraw::{Standing, WithdrawError};
 use crate::result_files;
 use crate::settings::Settings;
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use crate::system::safe_open;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -53,9 +53,9 @@ pub fn retry(names: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std
     for name in names {
         match remove(out, name) {
             Ok(()) if settings.quiet => {}
-            Ok(()) => say(&format!("{}: {by_whom}, if it is still in the inbox", shown(name))),
+            Ok(()) => say(&format!("{}: {by_whom}, if it is still in the inbox", escape(name))),
             Err(refused) => {
-                complain(&format!("{}: {refused}", shown(name)));
+                eprint_line(&format!("{}: {refused}", escape(name)));
                 exit = Exit::Refused;
             }
         }

@@ -1,6 +1,6 @@
 //! `planish run`: process files, once.
 
-use super::{Exit, complain, shown};
+use super::{Exit, eprint_line, escape};
 use crate::conveyor::Conveyor;
 use crate::conveyor::completion::{Done, End};
 use crate::input;
@@ -84,7 +84,7 @@ fn follow(jobs: &[Arc<Job>], conveyor: &Conveyor, stop: &Stop, quiet: bool) -> V
 fn message(conveyor: &Conveyor) -> String {
     let one = |job: crate::conveyor::progress::Running| {
         let charts = if job.charts > 1 { format!(" {}/{}", job.charts_done, job.charts) } else { String::new() };
-        format!("{}: {}{charts}", shown(&job.name), job.stage.name())
+        format!("{}: {}{charts}", escape(&job.name), job.stage.name())
     };
     conveyor.running().into_iter().take(4).map(one).collect::<Vec<_>>().join(", ")
 }
@@ -113,7 +113,7 @@ fn table(rows: &[Row]) -> Table {
         }
     }
     for (job, end) in rows {
-        let name = shown(&job.name);
+        let name = escape(&job.name);
         table.add_row(match (end.standing(), end) {
             (Some(done), _) => cells(name, done),
             (None, End::Unwanted) => vec![name, "interrupted".to_owned()],
@@ -148,24 +148,24 @@ fn cells(name: String, done: &Done) -> Vec<String> {
 /// Says on standard error what of an input was not as it should be, but was read all the same.
 fn tell_remarks(job: &Job, end: &End) {
     let End::Done(Done { report: Report { content: Some(content), .. }, .. }) = end else { return };
-    content.remarks.iter().for_each(|remark| complain(&format!("{}: {remark}", shown(&job.path))));
+    content.remarks.iter().for_each(|remark| eprint_line(&format!("{}: {remark}", escape(&job.path))));
 }
 
 /// Says on standard error what was wrong with an input.
 fn tell_trouble(job: &Job, end: &End) {
-    let input = shown(&job.path);
+    let input = escape(&job.path);
     match end {
-        End::Unwritten(error) => complain(&format!("{input}: {error}")),
+        End::Unwritten(error) => eprint_line(&format!("{input}: {error}")),
         End::Taken(done, error) | End::Unchained(done, error) => {
-            complain(&format!("{input}: {}, but {error}", done.report.status));
+            eprint_line(&format!("{input}: {}, but {error}", done.report.status));
         }
-        End::Changed => complain(&format!("{input}: it changed while it was read; try again")),
-        End::Waiting(reason) | End::Again(reason) => complain(&format!("{input}: {}", reason.message)),
-        End::Lost => complain(&format!("{input}: planish broke down; that is a fault of planish: please report it")),
+        End::Changed => eprint_line(&format!("{input}: it changed while it was read; try again")),
+        End::Waiting(reason) | End::Again(reason) => eprint_line(&format!("{input}: {}", reason.message)),
+        End::Lost => eprint_line(&format!("{input}: planish broke down; that is a fault of planish: please report it")),
         End::Done(Done { report: Report { reason: Some(reason), status, .. }, .. }) => {
             let untold = reason.place.as_ref().filter(|place| !reason.message.contains(place.as_str()));
             let place = untold.map_or(String::new(), |place| format!(" ({place})"));
-            complain(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
+            eprint_line(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
         }
         End::Done(_) | End::Later(..) | End::Held(..) | End::Outdated(_) | End::Unwanted | End::Same => {}
     }
@@ -175,9 +175,9 @@ fn tell_trouble(job: &Job, end: &End) {
 fn tell_refused(job: &Job, end: &End) {
     let refused = end.standing().map_or(&[][..], |done| &done.report.refused_components);
     for RefusedComponent { component, triangles, first_triangle, reason } in refused {
-        complain(&format!(
+        eprint_line(&format!(
             "{}: component {component} is refused, of {triangles} triangles from triangle {first_triangle} on: {} [{}]",
-            shown(&job.path),
+            escape(&job.path),
             reason.message,
             reason.code.name()
         ));
@@ -188,6 +188,6 @@ fn tell_refused(job: &Job, end: &End) {
 fn tell_doubts(job: &Job, end: &End) {
     if let Some(done) = end.standing() {
         let warnings = done.report.warnings.iter();
-        warnings.for_each(|w| complain(&format!("{}: warning: {}", shown(&job.path), w.message)));
+        warnings.for_each(|w| eprint_line(&format!("{}: warning: {}", escape(&job.path), w.message)));
     }
 }

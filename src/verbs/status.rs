@@ -1,6 +1,6 @@
 //! `planish status`: what a running daemon does.
 
-use super::{Exit, say, say_json, shown};
+use super::{Exit, escape, say, say_json};
 use crate::cli;
 use crate::operating::health::{self, Health};
 use crate::operating::status::{self, Counts, Noted, Progress, Refusal, Status};
@@ -34,7 +34,7 @@ struct Answer {
 /// Wrong usage.
 pub fn status(asked: &cli::Status, settings: &Settings) -> Result<Exit, Box<dyn std::error::Error>> {
     let out = settings.out.as_deref().ok_or(super::NO_OUT)?;
-    std::fs::read_dir(out).map_err(|e| format!("cannot read the output folder {}: {e}", shown(out)))?;
+    std::fs::read_dir(out).map_err(|e| format!("cannot read the output folder {}: {e}", escape(out)))?;
     let (running, daemon) = (status::is_running(out), status::told(out));
     let health = health::now(out, running, daemon.as_ref(), asked.max_age, settings.min_free);
     let is_good = if asked.health { health.healthy } else { running };
@@ -118,5 +118,5 @@ fn refusal(refusal: &Refusal) -> String {
 
 /// A name on one line, whatever its characters.
 fn plain(name: &str) -> String {
-    shown(name.as_ref())
+    escape(name.as_ref())
 }

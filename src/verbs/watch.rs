@@ -1,6 +1,6 @@
 //! `planish watch`: the daemon.
 
-use super::{Exit, check_config, shown};
+use super::{Exit, check_config, escape};
 use crate::after::holding;
 use crate::cli;
 use crate::conveyor::Conveyor;
@@ -8,7 +8,7 @@ use crate::operating::status::Lock;
 use crate::output::publish::Publisher;
 use crate::settings::{Inputs, Settings, SettingsError};
 use crate::system::disk::System;
-use crate::system::folder_checks::{self, Place, PlaceError};
+use crate::system::folder_checks::{self, FolderError, FolderRole};
 use crate::system::orphans;
 use crate::watch::daemon::{Daemon, Source};
 use crate::watch::signals::{self, Hangup};
@@ -44,7 +44,7 @@ pub fn watch(
     holding::recover(&System, inbox, settings.recursive);
     destinations(settings).for_each(|(_, folder)| holding::clear(&System, folder, settings.recursive));
     let conveyor = Conveyor::start(settings, publisher.clone(), true).map_err(|e| super::no_threads(&e))?;
-    tracing::info!(inbox = shown(inbox), out = shown(out), "watches");
+    tracing::info!(inbox = escape(inbox), out = escape(out), "watches");
     let source = Source { read, is_possible: &|settings| can_go(inbox, out, settings) };
     let ended = Daemon::new(inbox, (settings, source), &conveyor, (&mut lock, &publisher)).run(&stop)?;
     // Whoever has not reached a safe point by now is left behind: nothing of it can be published any more, and no command
@@ -59,16 +59,16 @@ pub fn watch(
 
 /// What is said of an inbox that cannot be read.
 pub(super) fn no_inbox(inbox: &Path, error: &std::io::Error) -> String {
-    format!("cannot watch {}: {error}; make the folder first", shown(inbox))
+    format!("cannot watch {}: {error}; make the folder first", escape(inbox))
 }
 
 /// Refuses folders of which one lies in another, and a file of metrics in the inbox.
-pub(super) fn refuse_nested(inbox: &Path, out: &Path, settings: &Settings) -> Result<(), PlaceError> {
-    let watched = Place::new("inbox", inbox);
-    let mut all = vec![watched, Place::new("output folder", out)];
-    all.extend(destinations(settings).map(|(role, folder)| Place::new(role, folder)));
+pub(super) fn refuse_nested(inbox: &Path, out: &Path, settings: &Settings) -> Result<(), FolderError> {
+    let watched = FolderRole::new("inbox", inbox);
+    let mut all = vec![watched, FolderRole::new("output folder", out)];
+    all.extend(destinations(settings).map(|(role, folder)| FolderRole::new(role, folder)));
     folder_checks::refuse_nested(&all)?;
-    let metrics = settings.metrics.iter().map(|file| Place::new("file of metrics", file));
+    let metrics = settings.metrics.iter().map(|file| FolderRole::new("file of metrics", file));
     folder_checks::refuse_nested(&[watched].into_iter().chain(metrics).collect::<Vec<_>>())
 }
 
@@ -79,7 +79,7 @@ pub(super) fn refuse_metrics(settings: &Settings) -> Result<(), String> {
     if folder.is_dir() && !file.is_dir() {
         return Ok(());
     }
-    Err(format!("the metrics cannot be written to {}: it must be a file in a folder that is there", shown(file)))
+    Err(format!("the metrics cannot be written to {}: it must be a file in a folder that is there", escape(file)))
 }
 
 /// Whether inputs leave the inbox.

@@ -5,7 +5,7 @@
 //! file that changes or goes while its job waits or runs withdraws the job; when it has settled again, it becomes a new
 //! one. Every state of a file becomes at most one job.
 
-use crate::system::fingerprint::Look;
+use crate::system::fingerprint::Fingerprint;
 use crate::system::passing;
 use blake3::Hash;
 use std::collections::BTreeMap;
@@ -17,26 +17,26 @@ use std::time::{Duration, Instant};
 pub const SETTLE: Duration = Duration::from_millis(1000);
 
 /// What a look at the folder shows: relative paths of all files that may hold a mesh.
-pub type Listing = BTreeMap<PathBuf, Seen>;
+pub type Snapshot = BTreeMap<PathBuf, Seen>;
 
 /// What is seen of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Seen {
     /// The file itself.
-    pub look: Look,
+    pub look: Fingerprint,
     /// The files beside it that it is known to ask for; none where one is missing.
-    pub beside: Vec<Option<Look>>,
+    pub beside: Vec<Option<Fingerprint>>,
 }
 
 /// What is to be done.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Change {
     /// A file has settled: it becomes a job. It is as it is since then.
-    Settled(PathBuf, Look, Instant),
+    Settled(PathBuf, Fingerprint, Instant),
     /// The job of a file has lost its sense: the file changed, or is gone.
     Withdrawn(PathBuf),
     /// A file that is done with is to be read once more: somebody may have written to it without a trace.
-    Doubted(PathBuf, Look, Hash),
+    Doubted(PathBuf, Fingerprint, Hash),
 }
 
 /// What became of a file that is done with, until it changes.
@@ -152,16 +152,16 @@ impl File {
 
 impl Inbox {
     /// Takes in what a look at `now` shows; tells what is to be done.
-    pub fn look(&mut self, listing: &Listing, now: Instant) -> Vec<Change> {
+    pub fn look(&mut self, snapshot: &Snapshot, now: Instant) -> Vec<Change> {
         let mut changes = Vec::new();
         self.files.retain(|name, file| {
-            let there = listing.contains_key(name);
+            let there = snapshot.contains_key(name);
             if !there && file.state == State::Submitted {
                 changes.push(Change::Withdrawn(name.clone()));
             }
             there
         });
-        for (name, seen) in listing {
+        for (name, seen) in snapshot {
             let file = self.files.entry(name.clone()).or_insert_with(|| File::new(seen.clone(), now));
             if file.seen != *seen {
                 if file.state == State::Submitted {
@@ -179,7 +179,7 @@ impl Inbox {
     }
 
     /// The job for this state of a file has ended, and the file is done with; it is doubted once, not before `doubt`.
-    pub fn done(&mut self, name: &Path, look: &Look, rest: Rest, doubt: Option<Doubt>) {
+    pub fn done(&mut self, name: &Path, look: &Fingerprint, rest: Rest, doubt: Option<Doubt>) {
         if let Some(file) = self.submitted(name, look) {
             file.state = State::Done(rest, doubt);
             file.failures = 0;
@@ -187,7 +187,7 @@ impl Inbox {
     }
 
     /// The job for this state of a file has ended, but is to be done again, not before `then`.
-    pub fn again(&mut self, name: &Path, look: &Look, then: Instant, why: &str) {
+    pub fn again(&mut self, name: &Path, look: &Fingerprint, then: Instant, why: &str) {
         if let Some(file) = self.submitted(name, look) {
             file.state = State::Later(then, why.to_owned());
         }
@@ -195,14 +195,14 @@ impl Inbox {
 
     /// The job for this state of a file could not be done, for a reason that passes: it is done again, the later, the more
     /// often that happened in a row; how often that was.
-    pub fn failed(&mut self, name: &Path, look: &Look, now: Instant, why: &str) -> u32 {
+    pub fn failed(&mut self, name: &Path, look: &Fingerprint, now: Instant, why: &str) -> u32 {
         let Some(file) = self.submitted(name, look) else { return 0 };
         file.failures = file.failures.saturating_add(1);
         file.state = State::Later(now + passing::pause(file.failures), why.to_owned());
         file.failures
     }
 
-    fn submitted(&mut self, name: &Path, look: &Look) -> Option<&mut File> {
+    fn submitted(&mut self, name: &Path, look: &Fingerprint) -> Option<&mut File> {
         self.files.get_mut(name).filter(|file| file.seen.look == *look && file.state == State::Submitted)
     }
 
@@ -266,12 +266,12 @@ mod tests {
     use super::*;
 
     /// Looks at files of these sizes, made for the test.
-    fn listing(files: &[(&str, usize)]) -> Listing {
+    fn snapshot(files: &[(&str, usize)]) -> Snapshot {
         let folder = tempfile::tempdir().expect("a folder");
         let look = |(name, size): &(&str, usize)| {
             let path = folder.path().join(name);
             std::fs::write(&path, vec![b'x'; *size]).expect("written");
-            let look = Look::at(&path).expect("there").expect("a file");
+            let look = Fingerprint::at(&path).expect("there").expect("a file");
             (PathBuf::from(name), Seen { look, beside: vec![] })
         };
         files.iter().map(look).collect()
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn a_file_becomes_a_job_once_when_it_has_settled() {
         let (mut inbox, start) = (Inbox::default(), Instant::now());
-        let files = listing(&[("a.stl", 1), ("b.stl", 2)]);
+        let files = snapshot(&[("a.stl", 1), ("b.stl", 2)]);
         assert!(inbox.look(&files, start).is_empty());
         assert!(inbox.look(&files, start + SETTLE / 2).is_empty());
         assert_eq!(inbox.due(), Some(start + SETTLE));
@@ -304,7 +304,7 @@ mod tests {
     fn a_slow_copy_settles_only_at_its_end() {
         let (mut inbox, start) = (Inbox::default(), Instant::now());
         for step in 0..10 {
-            let changes = inbox.look(&listing(&[("a.stl", step)]), start + SETTLE * step as u32);
+            let changes = inbox.look(&snapshot(&[("a.stl", step)]), start + SETTLE * step as u32);
             assert!(changes.is_empty(), "{changes:?}");
         }
     }
@@ -312,7 +312,7 @@ mod tests {
     #[test]
     fn change_and_removal_withdraw_a_job_and_newer_content_becomes_a_new_one() {
         let (mut inbox, start) = (Inbox::default(), Instant::now());
-        let (old, new) = (listing(&[("a.stl", 1)]), listing(&[("a.stl", 2)]));
+        let (old, new) = (snapshot(&[("a.stl", 1)]), snapshot(&[("a.stl", 2)]));
         inbox.look(&old, start);
         inbox.look(&old, start + SETTLE);
         let withdrawn = [Change::Withdrawn("a.stl".into())];
@@ -320,7 +320,7 @@ mod tests {
         // The end of the withdrawn job says nothing about the newer content.
         inbox.done(Path::new("a.stl"), &old[Path::new("a.stl")].look, Rest::Published, None);
         assert_eq!(settled(&inbox.look(&new, start + 3 * SETTLE)), ["a.stl"]);
-        assert_eq!(inbox.look(&Listing::new(), start + 4 * SETTLE), withdrawn);
+        assert_eq!(inbox.look(&Snapshot::new(), start + 4 * SETTLE), withdrawn);
         assert_eq!(inbox.notable().count(), 0);
         inbox.look(&new, start + 5 * SETTLE);
         assert_eq!(settled(&inbox.look(&new, start + 6 * SETTLE)), ["a.stl"], "it came back");
@@ -329,7 +329,7 @@ mod tests {
     #[test]
     fn what_is_to_be_done_again_waits() {
         let (mut inbox, start) = (Inbox::default(), Instant::now() + 10 * SETTLE);
-        let files = listing(&[("a.stl", 1)]);
+        let files = snapshot(&[("a.stl", 1)]);
         inbox.look(&files, start);
         inbox.look(&files, start + SETTLE);
         inbox.again(Path::new("a.stl"), &files[Path::new("a.stl")].look, start + 5 * SETTLE, "for the test");
@@ -338,9 +338,9 @@ mod tests {
     }
 
     /// A file that is done, in an inbox of its own.
-    fn done(rest: Rest, doubt: Option<Doubt>) -> (Inbox, Listing, Instant) {
+    fn done(rest: Rest, doubt: Option<Doubt>) -> (Inbox, Snapshot, Instant) {
         let (mut inbox, start) = (Inbox::default(), Instant::now());
-        let files = listing(&[("a.stl", 1)]);
+        let files = snapshot(&[("a.stl", 1)]);
         inbox.look(&files, start);
         inbox.look(&files, start + SETTLE);
         inbox.done(Path::new("a.stl"), &files[Path::new("a.stl")].look, rest, doubt);
@@ -376,7 +376,7 @@ mod tests {
     #[test]
     fn failures_in_a_row_are_tried_again_later_and_later() {
         let (mut inbox, start) = (Inbox::default(), Instant::now());
-        let files = listing(&[("a.stl", 1)]);
+        let files = snapshot(&[("a.stl", 1)]);
         let (name, look) = (Path::new("a.stl"), files[Path::new("a.stl")].look);
         inbox.look(&files, start);
         let mut now = start + SETTLE;
@@ -402,7 +402,7 @@ mod tests {
         // A file that changes all the time is restless since it came.
         let mut restless = Inbox::default();
         for step in 0..9 {
-            restless.look(&listing(&[("a.stl", step)]), now + SETTLE * step as u32 / 2);
+            restless.look(&snapshot(&[("a.stl", step)]), now + SETTLE * step as u32 / 2);
         }
         assert_eq!(restless.overdue(now + 5 * SETTLE, 5 * SETTLE).len(), 1);
         let (mut good, _, _) = done(Rest::Published, None);

@@ -7,13 +7,13 @@
 //!
 //! Deliberately absent: paths of events, a queue of events, and any memory of what was done but the published reports.
 
-use super::inbox::{Listing, Seen};
+use super::inbox::{Seen, Snapshot};
 use super::stop::Stop;
 use crate::conveyor::Conveyor;
-use crate::conveyor::completion::Ended;
+use crate::conveyor::completion::Completion;
 use crate::formats::{self, Kind};
-use crate::system::escape::shown;
-use crate::system::fingerprint::{Identity, Look};
+use crate::system::escape::escape;
+use crate::system::fingerprint::{Fingerprint, Identity};
 use crate::system::passing;
 use crossbeam_channel::{Receiver, Sender, after, bounded, select};
 use notify::event::{AccessKind, AccessMode, EventKind};
@@ -39,7 +39,7 @@ pub enum Event {
     /// Something happened in the inbox.
     Hint,
     /// A job has ended.
-    Ended(Box<Ended>),
+    Completion(Box<Completion>),
     /// The daemon is asked to stop.
     Stop,
     /// The daemon is asked to read its settings again.
@@ -49,38 +49,38 @@ pub enum Event {
 }
 
 /// Looks at the inbox, and hears when something happens in it.
-pub struct Eyes {
+pub struct InboxWatcher {
     inbox: PathBuf,
     recursive: bool,
     hints: Receiver<()>,
     /// Kept, so that the channel never closes: a closed one would be heard all the time.
     _tell: Sender<()>,
-    watcher: Option<RecommendedWatcher>,
+    notifier: Option<RecommendedWatcher>,
     /// The folder that is watched: another one may take its name.
     watched: Option<(Identity, Option<SystemTime>)>,
     is_missing: bool,
     passed_over: BTreeSet<PathBuf>,
     /// Files that ask for others beside them, with the names of these.
     beside: BTreeMap<PathBuf, Vec<String>>,
-    rested: Instant,
+    next_scan: Instant,
 }
 
-impl Eyes {
-    /// Eyes for the folder `inbox` (and, if asked, its sub-folders); without hints, if `poll`.
+impl InboxWatcher {
+    /// A watcher of the folder `inbox` (and, if asked, its sub-folders); without hints, if `poll`.
     pub fn new(inbox: &Path, recursive: bool, poll: bool) -> Self {
         let (tell, hints) = bounded(1);
-        let watcher = if poll { None } else { watcher(tell.clone()) };
+        let notifier = if poll { None } else { notifier(tell.clone()) };
         Self {
             inbox: inbox.to_owned(),
             recursive,
             hints,
             _tell: tell,
-            watcher,
+            notifier,
             watched: None,
             is_missing: false,
             passed_over: BTreeSet::new(),
             beside: BTreeMap::new(),
-            rested: Instant::now(),
+            next_scan: Instant::now(),
         }
     }
 
@@ -100,7 +100,7 @@ impl Eyes {
 
     /// How often to look even though nothing is heard.
     pub fn period(&self) -> Duration {
-        if self.watcher.is_some() && self.watched.is_some() { SCAN } else { POLL }
+        if self.notifier.is_some() && self.watched.is_some() { SCAN } else { POLL }
     }
 
     /// Whether the folder was there at the last look.
@@ -109,15 +109,15 @@ impl Eyes {
     }
 
     /// The earliest moment for the next look.
-    pub fn rested(&self) -> Instant {
-        self.rested
+    pub fn next_scan(&self) -> Instant {
+        self.next_scan
     }
 
     /// Waits until something happens, at most until `wake`.
     pub fn wait(&self, conveyor: &Conveyor, stop: &Stop, wake: Instant) -> Event {
         select! {
             recv(self.hints) -> _ => Event::Hint,
-            recv(conveyor.ended()) -> ended => ended.map_or(Event::Tick, |e| Event::Ended(Box::new(e))),
+            recv(conveyor.ended()) -> ended => ended.map_or(Event::Tick, |e| Event::Completion(Box::new(e))),
             recv(stop.heard) -> _ => Event::Stop,
             recv(stop.to_reload) -> _ => Event::Reload,
             recv(after(wake.saturating_duration_since(Instant::now()))) -> _ => Event::Tick,
@@ -126,30 +126,30 @@ impl Eyes {
 
     /// Looks at the folder: all files that may hold a mesh. None: it cannot be read at the moment; that it is gone
     /// means that there are no files.
-    pub fn look(&mut self) -> Option<Listing> {
+    pub fn look(&mut self) -> Option<Snapshot> {
         let began = Instant::now();
         let seen = std::fs::metadata(&self.inbox).and_then(|metadata| {
             self.watch_again((Identity::of(&metadata), metadata.created().ok()));
             self.scan()
         });
-        let listing = match seen {
-            Ok(listing) => {
+        let snapshot = match seen {
+            Ok(snapshot) => {
                 if std::mem::take(&mut self.is_missing) {
-                    tracing::info!(inbox = shown(&self.inbox), "the inbox is back");
+                    tracing::info!(inbox = escape(&self.inbox), "the inbox is back");
                 }
-                Some(listing)
+                Some(snapshot)
             }
             Err(error) => self.not_there(&error),
         };
         let now = Instant::now();
-        self.rested = now + REST.max(10 * now.saturating_duration_since(began));
-        listing
+        self.next_scan = now + REST.max(10 * now.saturating_duration_since(began));
+        snapshot
     }
 
-    fn not_there(&mut self, error: &io::Error) -> Option<Listing> {
+    fn not_there(&mut self, error: &io::Error) -> Option<Snapshot> {
         if !std::mem::replace(&mut self.is_missing, true) {
             tracing::warn!(
-                inbox = shown(&self.inbox),
+                inbox = escape(&self.inbox),
                 "cannot see the inbox: {error}; make it again, mount it, or let it be read"
             );
         }
@@ -157,40 +157,40 @@ impl Eyes {
         if is_gone {
             self.watched = None;
         }
-        is_gone.then(Listing::new)
+        is_gone.then(Snapshot::new)
     }
 
     /// Asks for hints of the folder that has the name of the inbox now.
     fn watch_again(&mut self, identity: (Identity, Option<SystemTime>)) {
-        let Some(watcher) = &mut self.watcher else { return };
+        let Some(notifier) = &mut self.notifier else { return };
         if self.watched == Some(identity) {
             return;
         }
         // It fails where the folder that was watched is gone.
-        let _ = watcher.unwatch(&self.inbox);
+        let _ = notifier.unwatch(&self.inbox);
         let mode = if self.recursive { RecursiveMode::Recursive } else { RecursiveMode::NonRecursive };
-        match watcher.watch(&self.inbox, mode) {
+        match notifier.watch(&self.inbox, mode) {
             Ok(()) => self.watched = Some(identity),
             Err(error) => {
                 tracing::warn!(
                     "the system tells nothing of the inbox ({error}), which is scanned every second instead; where its \
                      limit is reached, raise fs.inotify.max_user_watches, or say --poll"
                 );
-                self.watcher = None;
+                self.notifier = None;
             }
         }
     }
 
     /// Scans the folder.
-    fn scan(&mut self) -> io::Result<Listing> {
-        let mut listing = Listing::new();
+    fn scan(&mut self) -> io::Result<Snapshot> {
+        let mut snapshot = Snapshot::new();
         let depth = if self.recursive { usize::MAX } else { 1 };
         let is_open = |e: &DirEntry| e.depth() == 0 || !e.file_name().to_string_lossy().starts_with('.');
         let inbox = self.inbox.clone();
         for entry in WalkDir::new(&inbox).max_depth(depth).into_iter().filter_entry(is_open) {
             match entry {
                 Ok(entry) => match self.see(&entry) {
-                    Ok(Some((name, look))) => drop(listing.insert(name, look)),
+                    Ok(Some((name, look))) => drop(snapshot.insert(name, look)),
                     Ok(None) => {}
                     // What cannot be seen at the moment has not gone.
                     Err(error) if passing::passes(&error) => return Err(error),
@@ -207,7 +207,7 @@ impl Eyes {
                 }
             }
         }
-        Ok(listing)
+        Ok(snapshot)
     }
 
     /// A file that may hold a mesh, by its path below the inbox.
@@ -218,17 +218,17 @@ impl Eyes {
         }
         let kind = entry.file_type();
         let look = if kind.is_file() {
-            Some(Look::of(&entry.metadata().map_err(of_the_system)?))
+            Some(Fingerprint::of(&entry.metadata().map_err(of_the_system)?))
         } else if kind.is_symlink() && self.leads_inside(entry.path()) {
-            Look::at(entry.path())?
+            Fingerprint::at(entry.path())?
         } else {
             if !kind.is_dir() && self.passed_over.insert(name.to_owned()) {
-                tracing::warn!(input = shown(name), "passed over: no regular file of the inbox; copy the file itself");
+                tracing::warn!(input = escape(name), "passed over: no regular file of the inbox; copy the file itself");
             }
             None
         };
         let asked = self.beside.get(name).into_iter().flatten();
-        let beside = asked.map(|file| Look::at(&entry.path().with_file_name(file)).ok().flatten());
+        let beside = asked.map(|file| Fingerprint::at(&entry.path().with_file_name(file)).ok().flatten());
         Ok(look.map(|look| (name.to_owned(), Seen { look, beside: beside.collect() })))
     }
 
@@ -246,7 +246,7 @@ fn of_the_system(error: walkdir::Error) -> io::Error {
 }
 
 /// What asks the system for hints, and passes each on as a bare sign that something happened.
-fn watcher(tell: Sender<()>) -> Option<RecommendedWatcher> {
+fn notifier(tell: Sender<()>) -> Option<RecommendedWatcher> {
     let hint = move |event: notify::Result<notify::Event>| {
         if event.is_ok_and(|e| !is_news(&e.kind)) {
             return;
@@ -271,8 +271,8 @@ fn is_news(kind: &EventKind) -> bool {
 mod tests {
     use super::*;
 
-    fn names(listing: Option<Listing>) -> Vec<String> {
-        listing.expect("readable").into_keys().map(|n| n.display().to_string()).collect()
+    fn names(snapshot: Option<Snapshot>) -> Vec<String> {
+        snapshot.expect("readable").into_keys().map(|n| n.display().to_string()).collect()
     }
 
     #[test]
@@ -284,8 +284,8 @@ mod tests {
             std::fs::write(inbox.join(name), name).expect("written");
         }
         std::fs::create_dir(inbox.join("folder.stl")).expect("made");
-        assert_eq!(names(Eyes::new(&inbox, false, true).look()), ["a.stl", "h.ply"]);
-        assert_eq!(names(Eyes::new(&inbox, true, true).look()), ["a.stl", "h.ply", "sub/f.obj"]);
+        assert_eq!(names(InboxWatcher::new(&inbox, false, true).look()), ["a.stl", "h.ply"]);
+        assert_eq!(names(InboxWatcher::new(&inbox, true, true).look()), ["a.stl", "h.ply", "sub/f.obj"]);
     }
 
     #[cfg(unix)]
@@ -310,17 +310,17 @@ mod tests {
             0,
         )
         .expect("made");
-        assert_eq!(names(Eyes::new(&inbox, false, true).look()), ["a.stl", "hard.stl", "inside.stl"]);
+        assert_eq!(names(InboxWatcher::new(&inbox, false, true).look()), ["a.stl", "hard.stl", "inside.stl"]);
     }
 
     #[test]
     fn where_no_hints_come_none_are_heard() {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut eyes = Eyes::new(folder.path(), false, true);
-        assert!(eyes.hints.try_recv().is_err_and(|e| e.is_empty()), "closed");
-        eyes.watcher = watcher(eyes._tell.clone());
-        eyes.watcher = None;
-        assert!(eyes.hints.try_recv().is_err_and(|e| e.is_empty()), "closed");
+        let mut watcher = InboxWatcher::new(folder.path(), false, true);
+        assert!(watcher.hints.try_recv().is_err_and(|e| e.is_empty()), "closed");
+        watcher.notifier = notifier(watcher._tell.clone());
+        watcher.notifier = None;
+        assert!(watcher.hints.try_recv().is_err_and(|e| e.is_empty()), "closed");
     }
 
     #[test]
@@ -328,15 +328,15 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let inbox = folder.path().join("in");
         std::fs::create_dir(&inbox).expect("made");
-        let mut eyes = Eyes::new(&inbox, false, false);
+        let mut watcher = InboxWatcher::new(&inbox, false, false);
         for _ in 0..2 {
-            assert!(names(eyes.look()).is_empty());
-            while eyes.hints.try_recv().is_ok() {}
+            assert!(names(watcher.look()).is_empty());
+            while watcher.hints.try_recv().is_ok() {}
             std::fs::write(inbox.join("a.stl"), "a").expect("written");
-            eyes.hints.recv_timeout(Duration::from_secs(20)).expect("a hint");
-            assert_eq!(names(eyes.look()), ["a.stl"]);
+            watcher.hints.recv_timeout(Duration::from_secs(20)).expect("a hint");
+            assert_eq!(names(watcher.look()), ["a.stl"]);
             std::fs::remove_dir_all(&inbox).expect("removed");
-            assert!(names(eyes.look()).is_empty());
+            assert!(names(watcher.look()).is_empty());
             std::fs::create_dir(&inbox).expect("made again");
         }
     }

@@ -5,8 +5,8 @@ use crate::support::{Out, fixture, planish, root};
 use planish::after::hooks::{self, Account, Chain, Outcome, Target};
 use planish::report::mesh::MeshReport;
 use planish::result_files;
-use planish::settings::{CommandSaid, Said};
 use planish::settings::{Hook, Occasion};
+use planish::settings::{RawCommand, RawSettings};
 use std::path::Path;
 
 /// The settings file of the README's section "Drop a file, get a mesh".
@@ -19,10 +19,10 @@ pub fn settings_file() -> String {
 
 /// The hook with the programs of the environment on its PATH.
 fn with_tools(hook: &Hook) -> Hook {
-    let CommandSaid { command, time_limit } = hook.configured().clone();
+    let RawCommand { command, time_limit } = hook.configured().clone();
     let path = format!("PATH={}", tools().to_str().expect("UTF-8"));
     let command = ["env".to_owned(), path].into_iter().chain(command).collect();
-    Hook::new(CommandSaid { command, time_limit }, Occasion::Certified).expect("valid")
+    Hook::new(RawCommand { command, time_limit }, Occasion::Certified).expect("valid")
 }
 
 /// Runs all commands to their end.
@@ -56,7 +56,7 @@ fn the_recipe_makes_a_mesh_and_nothing_else() {
     let out = Out::new();
     let target = result(&out);
     let before = files(target.folder());
-    let said: Said = toml::from_str(&settings_file()).expect("valid");
+    let said: RawSettings = toml::from_str(&settings_file()).expect("valid");
     let recipe: Vec<Hook> = said.check().expect("in range").on_certified.iter().map(with_tools).collect();
     let account = ran(&recipe, &target, &out);
     assert_eq!(account.failure(), None);
@@ -78,15 +78,15 @@ fn the_recipe_makes_a_mesh_and_nothing_else() {
 fn a_mesh_that_is_not_faithful_is_told() {
     let out = Out::new();
     let target = result(&out);
-    let said: Said = toml::from_str(&settings_file()).expect("valid");
+    let said: RawSettings = toml::from_str(&settings_file()).expect("valid");
     let mut recipe: Vec<Hook> = said.check().expect("in range").on_certified.iter().map(with_tools).collect();
     // In the place of the mesher, one that makes a single triangle.
     let lose = "printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' > \"$1\"/remeshed.obj";
     let command = ["sh", "-c", lose, "sh", "{folder}"].map(str::to_owned).into();
-    recipe[0] = Hook::new(CommandSaid { command, time_limit: 60.0 }, Occasion::Certified).expect("valid");
-    let CommandSaid { command, time_limit } = recipe[1].configured().clone();
+    recipe[0] = Hook::new(RawCommand { command, time_limit: 60.0 }, Occasion::Certified).expect("valid");
+    let RawCommand { command, time_limit } = recipe[1].configured().clone();
     let command = command.iter().map(|part| part.replace("remeshed.msh", "remeshed.obj")).collect();
-    recipe[1] = Hook::new(CommandSaid { command, time_limit }, Occasion::Certified).expect("valid");
+    recipe[1] = Hook::new(RawCommand { command, time_limit }, Occasion::Certified).expect("valid");
     let account = ran(&recipe, &target, &out);
     assert!(account.failure().is_some(), "{account:?}");
     let outcomes: Vec<Outcome> = account.commands.iter().map(|c| c.outcome).collect();
@@ -102,10 +102,10 @@ fn accounts_follow_the_published_schema_and_leave_the_proof_alone() {
     let target = result(&out);
     let sh = |script: &str, time_limit| {
         let command = ["sh", "-c", script].map(str::to_owned).into();
-        Hook::new(CommandSaid { command, time_limit }, Occasion::Certified).expect("valid")
+        Hook::new(RawCommand { command, time_limit }, Occasion::Certified).expect("valid")
     };
     let missing =
-        Hook::new(CommandSaid { command: vec!["no-such-program".to_owned()], time_limit: 60.0 }, Occasion::Certified)
+        Hook::new(RawCommand { command: vec!["no-such-program".to_owned()], time_limit: 60.0 }, Occasion::Certified)
             .expect("valid");
     let cases = [
         (vec![sh("echo made > made; yes | head -c 100000", 60.0)], Outcome::Succeeded),

@@ -10,8 +10,8 @@
 
 use crate::after::holding::{HOLDING, Holding};
 use crate::system::disk::{self, Disk, File, Folder, Stat};
-use crate::system::escape::shown;
-use crate::system::fingerprint::Look;
+use crate::system::escape::escape;
+use crate::system::fingerprint::Fingerprint;
 use crate::system::safe_open::OpenError;
 use blake3::{Hash, Hasher};
 use rustix::process::geteuid;
@@ -33,7 +33,7 @@ pub struct Processed<'a> {
     /// Its path below the inbox.
     pub name: &'a Path,
     /// What the file looked like.
-    pub look: &'a Look,
+    pub look: &'a Fingerprint,
     /// The hash of its content.
     pub hash: Hash,
 }
@@ -62,8 +62,8 @@ pub enum Fate {
 
 /// Why an input is not put away.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot put the input {} away: {error}; check the permissions of its folder and of the one it goes to", shown(.path))]
-pub struct PutAwayError {
+#[error("cannot put the input {} away: {error}; check the permissions of its folder and of the one it goes to", escape(.path))]
+pub struct ArchiveError {
     /// The file.
     path: PathBuf,
     /// Why.
@@ -81,10 +81,10 @@ enum Kept<F> {
 /// Puts an input away, if it still is what was processed, and nobody has it open to write to it.
 ///
 /// # Errors
-/// [`PutAwayError`]; then the file is where it was, untouched where its folder cannot be written or it has no place to
+/// [`ArchiveError`]; then the file is where it was, untouched where its folder cannot be written or it has no place to
 /// go to; and nothing is left of the attempt.
-pub fn put_away(disk: &impl Disk, input: &Processed, way: Way) -> Result<Fate, PutAwayError> {
-    try_to_put_away(disk, input, way).map_err(|error| PutAwayError { path: input.inbox.join(input.name), error })
+pub fn archive(disk: &impl Disk, input: &Processed, way: Way) -> Result<Fate, ArchiveError> {
+    try_to_put_away(disk, input, way).map_err(|error| ArchiveError { path: input.inbox.join(input.name), error })
 }
 
 fn try_to_put_away<D: Disk>(disk: &D, input: &Processed, way: Way) -> io::Result<Fate> {
@@ -99,7 +99,7 @@ fn try_to_put_away<D: Disk>(disk: &D, input: &Processed, way: Way) -> io::Result
         Err(error) if error.is_missing() => return Ok(Fate::Nothing),
         opened => opened.map_err(OpenError::into_io)?,
     };
-    if Look::of_stat(&file.stat()?) != *input.look {
+    if Fingerprint::of_stat(&file.stat()?) != *input.look {
         return Ok(Fate::Changed);
     }
     if file.has_writer()? == Some(true) {
@@ -174,11 +174,11 @@ fn looked_at<F: File>(input: &Processed, opened: Result<F, OpenError>) -> io::Re
         Err(OpenError::NotRegular) => return Ok(Fate::Changed),
         opened => opened.map_err(OpenError::into_io)?,
     };
-    let before = Look::of_stat(&file.stat()?);
+    let before = Fingerprint::of_stat(&file.stat()?);
     if !before.is_renamed(input.look) || hash_of(&file, input)? != input.hash {
         return Ok(Fate::Changed);
     }
-    if Look::of_stat(&file.stat()?) != before {
+    if Fingerprint::of_stat(&file.stat()?) != before {
         return Ok(Fate::Changed);
     }
     // Whoever opened it before it was held may still write to it.
@@ -239,7 +239,7 @@ fn keep_at<D: Disk>(
         }
         return Ok(Some(kept));
     }
-    Err(io::Error::new(ErrorKind::AlreadyExists, format!("{} and {MOST_COPIES} numbered names exist", shown(place))))
+    Err(io::Error::new(ErrorKind::AlreadyExists, format!("{} and {MOST_COPIES} numbered names exist", escape(place))))
 }
 
 /// Brings to disk the names in a folder, and its own, and those of the folders above it that inputs have made.
@@ -268,7 +268,7 @@ fn put_in_free_place<F: Folder>(
         Err(_) => return copy_to_free_place(input, &source.file, folder, name),
     }
     match folder.stat_of(name) {
-        Ok(made) if made.is_file() && Look::of_stat(&made).is_renamed(input.look) => Ok(Some(made)),
+        Ok(made) if made.is_file() && Fingerprint::of_stat(&made).is_renamed(input.look) => Ok(Some(made)),
         // The name is not looked at again: what it was given to a moment ago is known by it only.
         not_it => folder.unlink(name).and(not_it.map(|_| None)),
     }
@@ -309,7 +309,9 @@ fn open_up<F: Folder>(folder: &F, copy: &F::File, from: &F::File) -> io::Result<
 /// Fills a copy; whether it is what was processed.
 fn fill<F: File>(input: &Processed, from: &F, to: &F) -> io::Result<bool> {
     let original = from.stat()?;
-    if !Look::of_stat(&original).is_renamed(input.look) || copy(from, input, |bytes| to.append(bytes))? != input.hash {
+    if !Fingerprint::of_stat(&original).is_renamed(input.look)
+        || copy(from, input, |bytes| to.append(bytes))? != input.hash
+    {
         return Ok(false);
     }
     to.set_time(original.modified)?;

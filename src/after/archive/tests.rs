@@ -21,19 +21,19 @@ impl Place {
         fs::read_to_string(self.path(name)).expect("there")
     }
 
-    fn write(&self, name: &str, text: &str) -> Look {
+    fn write(&self, name: &str, text: &str) -> Fingerprint {
         fs::write(self.path(name), text).expect("written");
         self.look(name)
     }
 
-    fn look(&self, name: &str) -> Look {
-        Look::at(&self.path(name)).expect("there").expect("a file")
+    fn look(&self, name: &str) -> Fingerprint {
+        Fingerprint::at(&self.path(name)).expect("there").expect("a file")
     }
 
     /// Puts a file away that looked like this when `text` was read from it.
-    fn put(&self, name: &str, look: &Look, text: &str, way: Way) -> Result<Fate, PutAwayError> {
+    fn put(&self, name: &str, look: &Fingerprint, text: &str, way: Way) -> Result<Fate, ArchiveError> {
         let (inbox, name, hash) = (self.folder.path(), Path::new(name), blake3::hash(text.as_bytes()));
-        put_away(&System, &Processed { inbox, name, look, hash }, way)
+        archive(&System, &Processed { inbox, name, look, hash }, way)
     }
 
     fn all(&self) -> Vec<String> {

@@ -3,7 +3,7 @@
 use super::Hook;
 use super::output::Tail;
 use super::process::{End, Ended, Limits};
-use crate::settings::CommandSaid;
+use crate::settings::RawCommand;
 use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;
 
@@ -85,7 +85,7 @@ impl Account {
 
 impl Ran {
     fn is_of(&self, hook: &Hook) -> bool {
-        let CommandSaid { command, time_limit } = hook.configured();
+        let RawCommand { command, time_limit } = hook.configured();
         (&self.configured, self.time_limit) == (command, *time_limit)
     }
 

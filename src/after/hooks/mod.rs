@@ -23,7 +23,7 @@ use crate::input::read_file;
 use crate::result_files;
 use crate::settings::Hook;
 use crate::system::disk::{self, Disk, System};
-use crate::system::escape::{printable, printable_json, shown};
+use crate::system::escape::{escape, printable, printable_json};
 use crate::system::orphans::{self, GRACE};
 use crate::system::passing;
 pub use account::{Account, Outcome, Ran, SCHEMA};
@@ -92,7 +92,7 @@ pub enum HookError {
     /// The system refuses.
     #[error(
         "commands cannot run: {}: {error}; check that the disk has room and the folder may be written",
-        shown(.path)
+        escape(.path)
     )]
     Io {
         /// Where.
@@ -101,7 +101,7 @@ pub enum HookError {
         error: io::Error,
     },
     /// There is no result.
-    #[error("commands cannot run: {} holds no report.json that can be read; process its input again", shown(.0))]
+    #[error("commands cannot run: {} holds no report.json that can be read; process its input again", escape(.0))]
     NoReport(PathBuf),
     /// The system has no room for another process at the moment.
     #[error(
@@ -160,7 +160,7 @@ pub fn run(hooks: &[Hook], target: &Target, staging: &Path, wanted: &dyn Fn() ->
     let mut commands: Vec<Ran> = Vec::new();
     for hook in hooks {
         if commands.iter().any(|c| c.outcome != Outcome::Succeeded) {
-            commands.push(Ran::skipped(hook, told(&program(hook, target))));
+            commands.push(Ran::skipped(hook, describe(&program(hook, target))));
             continue;
         }
         let ran = run_one(hook, target, staging, wanted)?;
@@ -186,7 +186,7 @@ fn run_one(hook: &Hook, target: &Target, staging: &Path, wanted: &dyn Fn() -> bo
         return Ok(None);
     }
     let mut command = program(hook, target);
-    let words = told(&command);
+    let words = describe(&command);
     tracing::debug!(command = ?words, "command begins");
     orphans::mark(&mut command, staging).map_err(at(staging))?;
     let ran = match process::run(&mut command, limits(hook), wanted) {
@@ -223,7 +223,7 @@ fn program(hook: &Hook, target: &Target) -> Command {
 }
 
 /// Program and arguments as they may be shown.
-fn told(command: &Command) -> Vec<String> {
+fn describe(command: &Command) -> Vec<String> {
     std::iter::once(command.get_program()).chain(command.get_args()).map(|w| w.to_string_lossy().into_owned()).collect()
 }
 

@@ -1,7 +1,7 @@
 //! Chains of real commands.
 
 use super::*;
-use crate::settings::{CommandSaid, Occasion};
+use crate::settings::{Occasion, RawCommand};
 use std::ffi::OsString;
 use std::fs;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
@@ -46,7 +46,7 @@ impl World {
 
 fn hook(command: &[&str], time_limit: f64) -> Hook {
     let command = command.iter().map(ToString::to_string).collect();
-    Hook::new(CommandSaid { command, time_limit }, Occasion::Certified).expect("valid")
+    Hook::new(RawCommand { command, time_limit }, Occasion::Certified).expect("valid")
 }
 
 fn sh(script: &str) -> Hook {

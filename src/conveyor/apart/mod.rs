@@ -16,7 +16,7 @@ pub mod protocol;
 pub(super) mod stage;
 
 use super::budget::Account;
-use super::in_flight::Travel;
+use super::in_flight::InFlight;
 use crate::conveyor::stage::Stage;
 use crate::output::begun::{self, Entry};
 use crate::report::ResultSettings;
@@ -81,21 +81,21 @@ impl std::fmt::Display for Death {
 ///
 /// # Errors
 /// The system starts no process or thread.
-pub(super) fn run(travel: &Travel, folder: &Path) -> io::Result<Outcome> {
-    let mark = travel.mark_apart();
-    let mut child = start(travel, folder, mark.as_ref().map(|(path, _)| path))?;
+pub(super) fn run(in_flight: &InFlight, folder: &Path) -> io::Result<Outcome> {
+    let mark = in_flight.mark_apart();
+    let mut child = start(in_flight, folder, mark.as_ref().map(|(path, _)| path))?;
     let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
     let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
         return Err(io::Error::other("a process was started without pipes"));
     };
-    let line = Line::new(travel, stdin);
-    line.tell(&order(travel, mark.as_ref().map(|(_, entry)| entry.clone())));
+    let line = Line::new(in_flight, stdin);
+    line.tell(&order(in_flight, mark.as_ref().map(|(_, entry)| entry.clone())));
     let (evidence, ended) = (Mutex::default(), AtomicBool::new(false));
     let child = Mutex::new(child);
     let followed: io::Result<_> = std::thread::scope(|scope| {
         let helpers = line.help(scope).and_then(|channels| {
-            spawn(scope, "log", || pass_on_log(travel, stderr, &evidence))?;
-            let guard = spawn(scope, "guard", || guard(travel, &child, &ended))?;
+            spawn(scope, "log", || pass_on_log(in_flight, stderr, &evidence))?;
+            let guard = spawn(scope, "guard", || guard(in_flight, &child, &ended))?;
             Ok((channels, guard))
         });
         let followed = helpers.map(|(channels, guard)| (line.follow(stdout, &channels), guard));
@@ -125,8 +125,8 @@ fn program() -> io::Result<PathBuf> {
     if itself.exists() { Ok(itself.to_owned()) } else { std::env::current_exe() }
 }
 
-fn start(travel: &Travel, folder: &Path, mark: Option<&PathBuf>) -> io::Result<Child> {
-    let job = &travel.job;
+fn start(in_flight: &InFlight, folder: &Path, mark: Option<&PathBuf>) -> io::Result<Child> {
+    let job = &in_flight.job;
     let mut command = Command::new(program()?);
     command.arg0("planish").arg("job").arg("--name").arg(&job.name).arg("--into").arg(folder).args(log_level());
     if let Some(within) = &job.within {
@@ -153,8 +153,8 @@ fn log_level() -> &'static [&'static str] {
     }
 }
 
-fn order(travel: &Travel, mark: Option<Entry>) -> Order {
-    let settings = &travel.settings;
+fn order(in_flight: &InFlight, mark: Option<Entry>) -> Order {
+    let settings = &in_flight.settings;
     Order {
         mark,
         settings: ResultSettings::from(&**settings),
@@ -193,10 +193,10 @@ fn end(child: &Mutex<Child>) -> io::Result<ExitStatus> {
 }
 
 /// Ends the child when nobody wants it any more, or its time is over; why it did.
-fn guard(travel: &Travel, child: &Mutex<Child>, ended: &AtomicBool) -> Option<Outcome> {
-    let (began, limit) = (Instant::now(), travel.settings.job_time);
+fn guard(in_flight: &InFlight, child: &Mutex<Child>, ended: &AtomicBool) -> Option<Outcome> {
+    let (began, limit) = (Instant::now(), in_flight.settings.job_time);
     while !ended.load(Ordering::Relaxed) {
-        let outcome = if !travel.job.is_wanted() {
+        let outcome = if !in_flight.job.is_wanted() {
             Some(Outcome::Unwanted)
         } else if limit.is_some_and(|limit| began.elapsed().as_secs_f64() >= limit) {
             Some(Outcome::OutOfTime)
@@ -223,7 +223,7 @@ struct Logged {
 }
 
 /// Says what the child logs; what else it says on standard error is kept as evidence.
-fn pass_on_log(travel: &Travel, stderr: impl Read, evidence: &Mutex<VecDeque<String>>) {
+fn pass_on_log(in_flight: &InFlight, stderr: impl Read, evidence: &Mutex<VecDeque<String>>) {
     let mut stderr = BufReader::new(stderr);
     loop {
         let mut line = Vec::new();
@@ -232,7 +232,7 @@ fn pass_on_log(travel: &Travel, stderr: impl Read, evidence: &Mutex<VecDeque<Str
             return;
         }
         match serde_json::from_slice::<Logged>(&line) {
-            Ok(logged) => log(travel, &logged),
+            Ok(logged) => log(in_flight, &logged),
             Err(_) => keep(&String::from_utf8_lossy(&line[..line.len().min(EVIDENCE.1 as usize)]), evidence),
         }
     }
@@ -250,9 +250,9 @@ fn keep(line: &str, evidence: &Mutex<VecDeque<String>>) {
     }
 }
 
-fn log(travel: &Travel, logged: &Logged) {
+fn log(in_flight: &InFlight, logged: &Logged) {
     let stage = logged.spans.iter().find_map(|span| span.get("stage")?.as_str()).unwrap_or_default();
-    let _in_stage = travel.in_stage(Stage::of(stage).unwrap_or(Stage::Read));
+    let _in_stage = in_flight.in_stage(Stage::of(stage).unwrap_or(Stage::Read));
     let message = logged.fields.get("message").and_then(|m| m.as_str()).unwrap_or_default();
     let fields = logged.fields.iter().filter(|(name, _)| *name != "message");
     let told = fields.fold(message.to_owned(), |told, (name, value)| format!("{told} {name}={value}"));
@@ -267,7 +267,7 @@ fn log(travel: &Travel, logged: &Logged) {
 
 /// What passes between a child and its parent.
 struct Line<'a> {
-    travel: &'a Travel,
+    in_flight: &'a InFlight,
     to: Mutex<ChildStdin>,
     /// Memory that the child has, in bytes.
     memory: AtomicU64,
@@ -286,8 +286,8 @@ struct Channels {
 const REQUESTS: usize = 1 << 14;
 
 impl<'a> Line<'a> {
-    fn new(travel: &'a Travel, to: ChildStdin) -> Self {
-        Self { travel, to: Mutex::new(to), memory: AtomicU64::new(0), gone: AtomicBool::new(false) }
+    fn new(in_flight: &'a InFlight, to: ChildStdin) -> Self {
+        Self { in_flight, to: Mutex::new(to), memory: AtomicU64::new(0), gone: AtomicBool::new(false) }
     }
 
     /// A child that listens no more has ended, and is found so.
@@ -300,7 +300,7 @@ impl<'a> Line<'a> {
         let (wants, wanted) = bounded(REQUESTS);
         let (leaves, left) = bounded(REQUESTS);
         let (memory, asked) = bounded(REQUESTS);
-        for _ in 0..self.travel.settings.jobs {
+        for _ in 0..self.in_flight.settings.jobs {
             let (wanted, left) = (wanted.clone(), left.clone());
             spawn(scope, "place", move || wanted.iter().for_each(|()| self.lend_place(&left)))?;
         }
@@ -310,12 +310,12 @@ impl<'a> Line<'a> {
 
     /// Waits for a place, lends it to the child, and gives it back when the child does, or has ended.
     fn lend_place(&self, left: &Receiver<()>) {
-        let (grants, turn) = (&self.travel.shared.grants, self.travel.turn);
+        let (grants, turn) = (&self.in_flight.shared.grants, self.in_flight.turn);
         grants.enter(turn);
         self.tell(&Told::Place);
         while let Err(RecvTimeoutError::Timeout) = left.recv_timeout(POLL) {
             if grants.is_waited_for(turn) {
-                self.tell(&Told::LetPass);
+                self.tell(&Told::YieldTo);
             }
         }
         grants.leave();
@@ -325,7 +325,7 @@ impl<'a> Line<'a> {
         if self.gone.load(Ordering::SeqCst) {
             return;
         }
-        self.travel.shared.grants.take(Account::Factor, bytes, self.travel.turn);
+        self.in_flight.shared.grants.take(Account::Factor, bytes, self.in_flight.turn);
         self.memory.fetch_add(bytes, Ordering::SeqCst);
         if self.gone.load(Ordering::SeqCst) {
             return self.give_all_back();
@@ -334,7 +334,7 @@ impl<'a> Line<'a> {
     }
 
     fn try_to_lend_memory(&self, ticket: u64, bytes: u64) {
-        let granted = self.travel.shared.grants.try_take(Account::Factor, bytes);
+        let granted = self.in_flight.shared.grants.try_take(Account::Factor, bytes);
         if granted {
             self.memory.fetch_add(bytes, Ordering::SeqCst);
         }
@@ -343,7 +343,7 @@ impl<'a> Line<'a> {
 
     fn take_memory_back(&self, bytes: u64) {
         self.memory.fetch_sub(bytes, Ordering::SeqCst);
-        self.travel.shared.grants.give_back(Account::Factor, bytes);
+        self.in_flight.shared.grants.give_back(Account::Factor, bytes);
     }
 
     /// The child has ended: what it had is given back, and it gets no more.
@@ -356,7 +356,7 @@ impl<'a> Line<'a> {
     fn give_all_back(&self) {
         let bytes = self.memory.swap(0, Ordering::SeqCst);
         if bytes > 0 {
-            self.travel.shared.grants.give_back(Account::Factor, bytes);
+            self.in_flight.shared.grants.give_back(Account::Factor, bytes);
         }
     }
 
@@ -376,7 +376,7 @@ impl<'a> Line<'a> {
     }
 
     fn take_in(&self, said: Said, channels: &Channels) {
-        self.travel.shared.step();
+        self.in_flight.shared.step();
         match said {
             Said::Want => drop(channels.wants.send(())),
             Said::Leave => drop(channels.leaves.send(())),
@@ -384,10 +384,10 @@ impl<'a> Line<'a> {
             Said::Take { ticket, bytes } => drop(channels.memory.send((ticket, bytes))),
             Said::GiveBack { bytes } => self.take_memory_back(bytes),
             Said::Progress { stage, charts_done, charts, trouble } => {
-                self.travel.is_at(stage, charts_done, charts);
-                self.travel.is_in_trouble(trouble);
+                self.in_flight.is_at(stage, charts_done, charts);
+                self.in_flight.is_in_trouble(trouble);
             }
-            Said::Beside { names } => self.travel.job.set_beside(names),
+            Said::Beside { names } => self.in_flight.job.set_beside(names),
             Said::Ended(_) => {}
         }
     }

@@ -63,7 +63,7 @@ impl Parent {
     fn take_in(&self, told: Told) {
         match told {
             Told::Place => self.place(),
-            Told::LetPass => self.is_waited_for.store(true, Ordering::Relaxed),
+            Told::YieldTo => self.is_waited_for.store(true, Ordering::Relaxed),
             Told::Answer { ticket, granted } => {
                 self.state.lock().answers.insert(ticket, granted);
                 self.changed.notify_all();
@@ -144,7 +144,7 @@ impl Grants for Parent {
         }
     }
 
-    fn let_pass(&self, turn: Turn) {
+    fn yield_to(&self, turn: Turn) {
         if self.is_waited_for(turn) {
             self.leave();
             self.enter(turn);

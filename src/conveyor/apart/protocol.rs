@@ -42,7 +42,7 @@ pub enum Told {
     /// A place to compute is yours.
     Place,
     /// Somebody waits who is ahead of you.
-    LetPass,
+    YieldTo,
     /// The answer to a request for memory.
     Answer {
         /// Of which request.

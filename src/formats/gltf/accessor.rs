@@ -113,7 +113,7 @@ impl Accessors<'_> {
     /// Without data of its own, an accessor's may be compressed: that has a name.
     fn without_data(&self, index: Index<Accessor>) -> GltfError {
         let used = self.root.extensions_used.iter().find(|name| name.contains("compression"));
-        used.map_or_else(|| broken(place(index), "no data"), |name| GltfError::Extension(super::shown(name)))
+        used.map_or_else(|| broken(place(index), "no data"), |name| GltfError::Extension(super::escape(name)))
     }
 
     /// The places whose values a sparse accessor gives.

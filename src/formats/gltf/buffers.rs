@@ -1,6 +1,6 @@
 //! The data of a document, and views of them.
 
-use super::{GltfError, Source, broken, shown};
+use super::{GltfError, Source, broken, escape};
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -63,7 +63,7 @@ fn fetch(uri: &str, buffer: usize, most: u64, source: &Source) -> Result<Vec<u8>
     if let Some(data) = uri.strip_prefix("data:") {
         return embedded(data).ok_or_else(|| broken(format!("buffers[{buffer}].uri"), "no base64 data"));
     }
-    let name = plain_name(uri).ok_or_else(|| GltfError::Uri { buffer, uri: shown(uri) })?;
+    let name = plain_name(uri).ok_or_else(|| GltfError::Uri { buffer, uri: escape(uri) })?;
     source.beside.read(&name, most).map_err(|problem| GltfError::Missing { buffer, problem })
 }
 

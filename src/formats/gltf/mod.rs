@@ -2,7 +2,7 @@
 //!
 //! The library parses the JSON; what it describes is read here, as the document is not to be trusted: every index, offset
 //! and count is checked against what is there, and **no file is opened** but plain names beside the document, through
-//! [`Beside`](super::Beside). All primitives of the default scene are read, once for each node that shows their mesh,
+//! [`SiblingFiles`](super::Beside). All primitives of the default scene are read, once for each node that shows their mesh,
 //! in the place where the node has it: triangles, strips and fans; points and lines are counted. Lengths are metres by
 //! the specification. Materials, animations, skins and morph targets mean nothing here.
 
@@ -146,7 +146,7 @@ fn parse(json: &[u8]) -> Result<Root, GltfError> {
     let fail = |e: serde_json::Error| GltfError::Json { line: e.line(), problem: e.to_string() };
     let document = Document::new(bare).map_err(fail)?;
     match document.version() {
-        Some(version) if version.split('.').next() != Some("2") => Err(GltfError::Version(shown(&version))),
+        Some(version) if version.split('.').next() != Some("2") => Err(GltfError::Version(escape(&version))),
         _ => Root::from_slice(&document.tidied()).map_err(fail),
     }
 }
@@ -156,13 +156,13 @@ fn refuse_extensions(root: &Root) -> Result<(), GltfError> {
     let is_about_materials = |name: &str| name.starts_with("KHR_materials_") || name.contains("texture");
     let foreign = |name: &&String| !HARMLESS.contains(&name.as_str()) && !is_about_materials(name);
     match root.extensions_required.iter().find(foreign) {
-        Some(name) => Err(GltfError::Extension(shown(name))),
+        Some(name) => Err(GltfError::Extension(escape(name))),
         None => Ok(()),
     }
 }
 
 /// Text of the document as it may be shown: short, on one line.
-fn shown(text: &str) -> String {
+fn escape(text: &str) -> String {
     text.chars().take(80).collect::<String>().escape_debug().to_string()
 }
 

@@ -1,4 +1,4 @@
-use super::super::{Beside, Format, Limits, Nothing, read_alone};
+use super::super::{Format, Limits, NoSiblings, SiblingFiles, read_alone};
 use super::*;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -181,7 +181,7 @@ fn sparse_and_quantised_positions_are_read() {
 #[derive(Default)]
 struct Recorder(RefCell<Vec<String>>);
 
-impl Beside for Recorder {
+impl SiblingFiles for Recorder {
     fn read(&self, name: &str, _most: u64) -> Result<Vec<u8>, String> {
         self.0.borrow_mut().push(name.to_owned());
         Ok(data())
@@ -244,7 +244,7 @@ fn nothing_is_asked_for_but_plain_names() {
         assert_eq!(asked.0.borrow().last().map(String::as_str), Some(name));
     }
     let document = with_uri("a.bin");
-    let source = Source { bytes: document.as_bytes(), limits: &Limits::default(), beside: &Nothing };
+    let source = Source { bytes: document.as_bytes(), limits: &Limits::default(), beside: &NoSiblings };
     let missing = super::super::read(Format::Gltf, &source).expect_err("not there").reason();
     assert_eq!(missing.code, Code::MissingFile);
 }
@@ -358,7 +358,7 @@ fn instances_do_not_take_memory_out_of_proportion() {
     let document = changed(&[("/nodes", many.into()), ("/scenes/0/nodes", list.into())]).to_string();
     let read = |expansion| {
         let limits = Limits { elements: 500, expansion, ..Limits::default() };
-        super::super::read(Format::Gltf, &Source { bytes: document.as_bytes(), limits: &limits, beside: &Nothing })
+        super::super::read(Format::Gltf, &Source { bytes: document.as_bytes(), limits: &limits, beside: &NoSiblings })
     };
     assert!(matches!(read(100), Err(ReadError::Gltf(GltfError::TooMuch { .. }))));
     let zeros = changed(&[(

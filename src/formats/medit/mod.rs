@@ -8,7 +8,7 @@
 mod sections;
 
 use super::finish::{self, BadPoints};
-use super::place::{Place, shown};
+use super::place::{Place, escape};
 use super::words::{Uncommented, Words, float, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
@@ -130,10 +130,10 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let mut words = Words::new(source.bytes, 1).without_comments();
     let first = words.next().unwrap_or_default();
     if !first.eq_ignore_ascii_case(b"MeshVersionFormatted") {
-        return Err(MeditError::NotMedit { begins: shown(first) }.into());
+        return Err(MeditError::NotMedit { begins: escape(first) }.into());
     }
     let mut file = File::new(source.limits);
-    let mut values = Values { words, section: shown(first) };
+    let mut values = Values { words, section: escape(first) };
     values.count()?;
     file.sections(&mut values)?;
     if file.dimension.is_none() {
@@ -170,7 +170,7 @@ impl<'a> Values<'a> {
     fn wrong(&self, word: &[u8], problem: impl FnOnce() -> String) -> MeditError {
         let (section, line) = (self.section.clone(), self.line());
         if is_keyword(word) {
-            return MeditError::Short { section, found: shown(word), line };
+            return MeditError::Short { section, found: escape(word), line };
         }
         MeditError::Value { section, problem: problem(), line }
     }
@@ -184,7 +184,7 @@ impl<'a> Values<'a> {
     fn count(&mut self) -> Result<u64, MeditError> {
         let word = self.word()?;
         let number = integer(word).and_then(|n| u64::try_from(n).ok());
-        number.ok_or_else(|| self.wrong(word, || format!("\"{}\" is no number that can stand here", shown(word))))
+        number.ok_or_else(|| self.wrong(word, || format!("\"{}\" is no number that can stand here", escape(word))))
     }
 
     /// A vertex, of so many, which are counted from 1.
@@ -192,7 +192,7 @@ impl<'a> Values<'a> {
         let word = self.word()?;
         let number =
             integer(word).and_then(|n| u32::try_from(n).ok()).filter(|n| (1..=vertices).contains(&(*n as usize)));
-        let problem = || format!("\"{}\" is no vertex: there are {vertices}, counted from 1", shown(word));
+        let problem = || format!("\"{}\" is no vertex: there are {vertices}, counted from 1", escape(word));
         Ok(number.ok_or_else(|| self.wrong(word, problem))? - 1)
     }
 
@@ -254,9 +254,9 @@ impl<'a> File<'a> {
         while let Some(word) = values.words.next() {
             if !is_keyword(word) {
                 let (section, line) = (values.section.clone(), values.line());
-                return Err(MeditError::NoKeyword { section, found: shown(word), line });
+                return Err(MeditError::NoKeyword { section, found: escape(word), line });
             }
-            values.section = shown(word);
+            values.section = escape(word);
             match Section::of(word) {
                 _ if word.eq_ignore_ascii_case(b"End") => break,
                 _ if word.eq_ignore_ascii_case(b"Dimension") => self.dimension(values)?,

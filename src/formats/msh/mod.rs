@@ -12,7 +12,7 @@ mod sparse;
 mod surface;
 mod values;
 
-use super::place::{Place, shown};
+use super::place::{Place, escape};
 use super::words::{Words, float};
 use super::{Content, Limits, Notes, Patches, ReadError, Source, TooMany};
 use crate::outcome::Code;
@@ -231,22 +231,22 @@ fn surface<'n>(source: &Source<'n>, keep: bool) -> Result<(Surface<'n>, Notes), 
         return Err(MshError::Version { version: "1".to_owned(), line: words.line() }.into());
     }
     if begins != b"$MeshFormat" {
-        return Err(MshError::NotMsh { begins: shown(begins) }.into());
+        return Err(MshError::NotMsh { begins: escape(begins) }.into());
     }
     let [name, encoding, size] = [words.next(), words.next(), words.next()].map(Option::unwrap_or_default);
     let line = words.line();
     let version = version(name, line)?;
     if size != b"8" {
-        return Err(format_error(line, format!("numbers of {} bytes are not read, only of 8", shown(size))).into());
+        return Err(format_error(line, format!("numbers of {} bytes are not read, only of 8", escape(size))).into());
     }
-    let name = shown(name);
+    let name = escape(name);
     match encoding {
         b"0" => body(Text(words), version, source.limits, keep, Notes::new(format!("MSH {name}, ASCII"))),
         b"1" => {
             let (values, order) = binary(source.bytes, words)?;
             body(values, version, source.limits, keep, Notes::new(format!("MSH {name}, binary, {order}")))
         }
-        other => Err(format_error(line, format!("\"{}\" is neither 0 (ASCII) nor 1 (binary)", shown(other))).into()),
+        other => Err(format_error(line, format!("\"{}\" is neither 0 (ASCII) nor 1 (binary)", escape(other))).into()),
     }
 }
 
@@ -259,7 +259,7 @@ fn version(name: &[u8], line: usize) -> Result<Version, MshError> {
         Some(number) if (2.0..=2.2).contains(&number) => Ok(Version::Two),
         Some(4.0) => Ok(Version::FourZero),
         Some(4.1) => Ok(Version::Four),
-        _ => Err(MshError::Version { version: shown(name), line }),
+        _ => Err(MshError::Version { version: escape(name), line }),
     }
 }
 
@@ -296,7 +296,7 @@ fn body<'a, 'n, V: Values<'a>>(
     // Whatever stands between sections is a comment.
     while let Some(word) = values.word() {
         if let Some(name) = word.strip_prefix(b"$") {
-            let section = shown(name);
+            let section = escape(name);
             found.section(name, &mut values, version, limits, &mut notes).map_err(|fault| match fault {
                 Fault::End => MshError::Truncated { section, place: values.place() },
                 Fault::Short => MshError::Short { section, place: values.place() },
@@ -352,15 +352,15 @@ impl<'n> Found<'n> {
 }
 
 fn second<'a>(name: &[u8], values: &impl Values<'a>) -> Fault {
-    MshError::SecondSection { section: shown(name), place: values.place() }.into()
+    MshError::SecondSection { section: escape(name), place: values.place() }.into()
 }
 
 /// Passes over the end of a section.
 fn end_section<'a>(values: &mut impl Values<'a>, name: &[u8]) -> Result<(), MshError> {
-    let section = shown(name);
+    let section = escape(name);
     match values.word() {
         Some(word) if word.strip_prefix(b"$End") == Some(name) => Ok(()),
-        Some(word) => Err(MshError::NoEnd { section, found: shown(word), place: values.place() }),
+        Some(word) => Err(MshError::NoEnd { section, found: escape(word), place: values.place() }),
         None => Err(MshError::Truncated { section, place: values.place() }),
     }
 }

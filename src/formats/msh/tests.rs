@@ -1,11 +1,11 @@
 use super::*;
 use crate::formats::mutate::mutations;
-use crate::formats::{Limits, Nothing};
+use crate::formats::{Limits, NoSiblings};
 use planish_core::mesh::SoupError;
 use planish_core::vec3::Vec3;
 
 fn content(bytes: &[u8]) -> Result<Content, ReadError> {
-    read(&Source { bytes, limits: &Limits::default(), beside: &Nothing })
+    read(&Source { bytes, limits: &Limits::default(), beside: &NoSiblings })
 }
 
 /// How a file is written.
@@ -482,7 +482,7 @@ fn a_file_cut_off_anywhere_is_refused() {
 #[test]
 fn limits_are_kept() {
     let limits = Limits { elements: 4, ..Limits::default() };
-    let with = |mesh: &Mesh| read(&Source { bytes: &mesh.file("2.2", Ascii), limits: &limits, beside: &Nothing });
+    let with = |mesh: &Mesh| read(&Source { bytes: &mesh.file("2.2", Ascii), limits: &limits, beside: &NoSiblings });
     let of = |number, elements: usize| Mesh { blocks: vec![(number, vec![vec![1, 2, 3, 4]; elements])], ..square() };
     assert!(with(&of(3, 2)).is_ok());
     for mesh in [of(3, 3), of(4, 5)] {

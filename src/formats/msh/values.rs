@@ -1,7 +1,7 @@
 //! The values of an MSH file, as text or binary. The names of sections are text in both.
 
 use super::MshError;
-use crate::formats::place::{Place, shown};
+use crate::formats::place::{Place, escape};
 use crate::formats::words::{Words, float, remedy};
 
 /// What is wrong in a section.
@@ -92,7 +92,7 @@ fn no_number(word: &[u8]) -> Fault {
     if word.starts_with(b"$") {
         return Fault::Short;
     }
-    Fault::Value(format!("\"{}\" is no number that can stand here{}", shown(word), remedy(word)))
+    Fault::Value(format!("\"{}\" is no number that can stand here{}", escape(word), remedy(word)))
 }
 
 /// Where the word that ends a section begins, and where it ends. Some writers of binary files (PyMesh, fTetWild) end no line

@@ -9,7 +9,7 @@
 mod statements;
 
 use super::finish::{self, BadPoints};
-use super::place::{Place, shown};
+use super::place::{Place, escape};
 use super::words::{float, foreign_number, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
@@ -196,7 +196,7 @@ fn check(statements: &Statements, limits: &Limits) -> Result<Geometry, ObjError>
 fn syntax(statement: &Statement) -> ObjError {
     let mut text = Vec::new();
     statement.write(&mut text);
-    ObjError::Syntax { line: statement.line, text: shown(&text) }
+    ObjError::Syntax { line: statement.line, text: escape(&text) }
 }
 
 /// The coordinates of a vertex.
@@ -216,7 +216,7 @@ fn point(statement: &Statement) -> Result<Vec3, ObjError> {
 mod tests {
     use super::*;
 
-    use crate::formats::Nothing;
+    use crate::formats::NoSiblings;
     use planish_core::mesh::{SoupError, TriangleSoup};
 
     fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
@@ -224,7 +224,7 @@ mod tests {
     }
 
     fn limited(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, ReadError> {
-        super::read(&Source { bytes, limits, beside: &Nothing }).map(|content| content.soup)
+        super::read(&Source { bytes, limits, beside: &NoSiblings }).map(|content| content.soup)
     }
 
     const SQUARE: &str = "# caf\u{e9}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";

@@ -7,7 +7,7 @@
 //! and other dimensions (`nOFF`) are refused, and so is the binary variant.
 
 use super::finish::{self, BadPoints};
-use super::place::{Place, shown};
+use super::place::{Place, escape};
 use super::words::{Uncommented, Words, float, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
@@ -145,7 +145,7 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     file.vertices(counts.vertices)?;
     file.faces(counts.faces, source.limits, &mut notes)?;
     if let Some(word) = file.words.next() {
-        return Err(OffError::Trailing { begins: shown(word), line: file.words.line() }.into());
+        return Err(OffError::Trailing { begins: escape(word), line: file.words.line() }.into());
     }
     finish::content(file.points, file.triangles, notes, &file.bad)
 }
@@ -163,7 +163,7 @@ fn head(words: &mut Uncommented, limits: &Limits) -> Result<Counts, OffError> {
             *words = begin;
             None
         }
-        None => return Err(OffError::NotOff { begins: shown(first) }),
+        None => return Err(OffError::NotOff { begins: escape(first) }),
     };
     let vertices = number(counts.or_else(|| words.next()), words)?;
     let faces = number(words.next(), words)?;
@@ -195,7 +195,7 @@ fn refuse_variant(kind: &[u8], words: &Uncommented) -> Result<(), OffError> {
 fn number(word: Option<&[u8]>, words: &Uncommented) -> Result<u64, OffError> {
     let number = word.and_then(integer).and_then(|n| u64::try_from(n).ok());
     number.ok_or_else(|| {
-        let problem = format!("\"{}\" is no number of elements", shown(word.unwrap_or_default()));
+        let problem = format!("\"{}\" is no number of elements", escape(word.unwrap_or_default()));
         OffError::Value { element: "the numbers of vertices and faces".to_owned(), problem, line: words.line() }
     })
 }
@@ -269,14 +269,14 @@ impl File<'_> {
         corners.clear();
         let word = self.words.next().ok_or(Fault::End)?;
         let count = integer(word).filter(|n| *n >= 0);
-        let count = count.ok_or_else(|| Fault::Value(format!("\"{}\" is no number of corners", shown(word))))?;
+        let count = count.ok_or_else(|| Fault::Value(format!("\"{}\" is no number of corners", escape(word))))?;
         for _ in 0..count {
             let word = self.words.next().ok_or(Fault::End)?;
             let corner =
                 integer(word).and_then(|i| u32::try_from(i).ok()).filter(|i| (*i as usize) < self.points.len());
             corners.push(corner.ok_or_else(|| {
                 let points = self.points.len();
-                Fault::Value(format!("\"{}\" is no vertex: there are {points}, counted from 0", shown(word)))
+                Fault::Value(format!("\"{}\" is no vertex: there are {points}, counted from 0", escape(word)))
             })?);
         }
         Ok(())

@@ -5,7 +5,7 @@ use super::binary::Plain;
 use super::header::{Element, Header, Property};
 use super::values::{Bad, Values};
 use crate::formats::finish::BadPoints;
-use crate::formats::place::shown;
+use crate::formats::place::escape;
 use crate::formats::{Limits, Notes, TooMany, polygon};
 use planish_core::vec3::Vec3;
 
@@ -264,5 +264,5 @@ fn end<'a>(values: impl Values<'a>) -> Result<(), PlyError> {
     if rest.is_empty() {
         return Ok(());
     }
-    Err(PlyError::Trailing { bytes: rest.len(), begins: shown(rest), place: values.place() })
+    Err(PlyError::Trailing { bytes: rest.len(), begins: escape(rest), place: values.place() })
 }

@@ -1,7 +1,7 @@
 //! The header of a PLY file: which elements there are, and what each of them holds.
 
 use super::PlyError;
-use crate::formats::place::shown;
+use crate::formats::place::escape;
 pub use crate::formats::scalar::Scalar;
 use crate::formats::words::Words;
 
@@ -94,7 +94,7 @@ impl Header {
     pub fn read(bytes: &[u8]) -> Result<Self, PlyError> {
         let mut lines = Lines::new(bytes);
         if lines.next().map(<[u8]>::trim_ascii) != Some(b"ply") {
-            return Err(PlyError::NotPly { begins: shown(bytes) });
+            return Err(PlyError::NotPly { begins: escape(bytes) });
         }
         let (mut encoding, mut elements) = (None, Vec::new());
         while let Some(text) = lines.next() {
@@ -141,7 +141,7 @@ fn statement(
             }
             element.properties.push(property);
         }
-        other => return Err(format!("\"{}\" is no keyword of PLY headers", shown(other))),
+        other => return Err(format!("\"{}\" is no keyword of PLY headers", escape(other))),
     }
     if elements.len() > ELEMENTS || elements.iter().any(|e| e.properties.len() > PROPERTIES) {
         return Err(format!("there are more than {ELEMENTS} elements, or {PROPERTIES} properties of one"));
@@ -152,29 +152,29 @@ fn statement(
 fn format(words: &mut Words) -> Result<Encoding, String> {
     let (kind, version) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
     if version != b"1.0" {
-        return Err(format!("this is version \"{}\" of PLY, and planish reads version 1.0", shown(version)));
+        return Err(format!("this is version \"{}\" of PLY, and planish reads version 1.0", escape(version)));
     }
     match kind {
         b"ascii" => Ok(Encoding::Ascii),
         b"binary_little_endian" => Ok(Encoding::Little),
         b"binary_big_endian" => Ok(Encoding::Big),
         other => {
-            Err(format!("\"{}\" is none of the formats ascii, binary_little_endian, binary_big_endian", shown(other)))
+            Err(format!("\"{}\" is none of the formats ascii, binary_little_endian, binary_big_endian", escape(other)))
         }
     }
 }
 
 fn element(words: &mut Words, line: usize) -> Result<Element, String> {
-    let name = shown(words.next().ok_or("an element has no name")?);
+    let name = escape(words.next().ok_or("an element has no name")?);
     let count = words.next().unwrap_or_default();
     let number = std::str::from_utf8(count).ok().and_then(|c| c.parse().ok());
-    let count = number.ok_or_else(|| format!("element {name} has the count \"{}\"", shown(count)))?;
+    let count = number.ok_or_else(|| format!("element {name} has the count \"{}\"", escape(count)))?;
     Ok(Element { name, count, properties: Vec::new(), line })
 }
 
 fn property(words: &mut Words) -> Result<Property, String> {
     let mut word = || words.next().unwrap_or_default();
-    let scalar = |word| Scalar::named(word).ok_or_else(|| format!("\"{}\" is no type of PLY files", shown(word)));
+    let scalar = |word| Scalar::named(word).ok_or_else(|| format!("\"{}\" is no type of PLY files", escape(word)));
     let (count, kind) = match word() {
         b"list" => (Some(scalar(word())?), word()),
         kind => (None, kind),
@@ -182,7 +182,7 @@ fn property(words: &mut Words) -> Result<Property, String> {
     if count.is_some_and(Scalar::is_float) {
         return Err("the length of a list is no whole number".to_owned());
     }
-    let (scalar, name) = (scalar(kind)?, shown(word()));
+    let (scalar, name) = (scalar(kind)?, escape(word()));
     if name.is_empty() {
         return Err("a property has no name".to_owned());
     }

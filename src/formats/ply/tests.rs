@@ -1,11 +1,11 @@
 use super::header::{Property, Scalar};
 use super::*;
 use crate::formats::mutate::mutations;
-use crate::formats::{Limits, Nothing};
+use crate::formats::{Limits, NoSiblings};
 use planish_core::mesh::SoupError;
 
 fn content(bytes: &[u8]) -> Result<Content, ReadError> {
-    read(&Source { bytes, limits: &Limits::default(), beside: &Nothing })
+    read(&Source { bytes, limits: &Limits::default(), beside: &NoSiblings })
 }
 
 fn error(bytes: &[u8]) -> PlyError {
@@ -241,7 +241,7 @@ fn a_file_cut_off_anywhere_is_refused() {
 #[test]
 fn limits_are_kept() {
     let limits = Limits { elements: 4, ..Limits::default() };
-    let with = |bytes: &[u8]| read(&Source { bytes, limits: &limits, beside: &Nothing });
+    let with = |bytes: &[u8]| read(&Source { bytes, limits: &limits, beside: &NoSiblings });
     assert!(with(square(&["3 0 1 2"; 4]).as_bytes()).is_ok());
     let error = |bytes: &[u8]| with(bytes).expect_err("too many").reason().code;
     assert_eq!(error(square(&["3 0 1 2"; 5]).as_bytes()), Code::TooLarge);

@@ -2,7 +2,7 @@
 
 use super::binary::Binary;
 use super::header::Scalar;
-use crate::formats::place::{Place, shown};
+use crate::formats::place::{Place, escape};
 use crate::formats::words::{Words, float, integer, no_number};
 
 /// What is wrong with a value.
@@ -97,7 +97,7 @@ impl<'a> Values<'a> for Text<'a> {
     fn end_record(&mut self) -> Result<(), Bad> {
         match self.0.next_in_line() {
             None => Ok(()),
-            Some(word) => Err(Bad::Value(format!("\"{}\" follows the last of its values", shown(word)))),
+            Some(word) => Err(Bad::Value(format!("\"{}\" follows the last of its values", escape(word)))),
         }
     }
 }

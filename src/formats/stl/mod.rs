@@ -8,7 +8,7 @@
 //! is told; text that ends in a facet is refused.
 
 use super::finish::{self, BadPoints};
-use super::place::{Place, shown};
+use super::place::{Place, escape};
 use super::words::{float, foreign_number, no_number};
 use super::{Content, Notes, ReadError, Source, TooMany};
 use crate::outcome::Code;
@@ -159,7 +159,7 @@ fn mismatch(declared: Option<u32>, bytes: &[u8]) -> StlError {
     match declared {
         None => StlError::Short { size },
         // What it would be as a count are four letters.
-        Some(_) if is_text(bytes) => StlError::NoSolid { begins: shown(text(bytes)) },
+        Some(_) if is_text(bytes) => StlError::NoSolid { begins: escape(text(bytes)) },
         Some(declared) => {
             let (needed, room) = (needed(declared), (size - HEADER) / RECORD);
             if needed > size as u64 {
@@ -296,14 +296,14 @@ fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Facets, StlError
             (b"endfacet", Some(3)) => (corners, ends_with_facet) = (None, true),
             (b"endfacet", Some(n)) => return Err(problem(&format!("a facet ends after {n} vertices"))),
             (b"solid" | b"endsolid" | b"facet", Some(n)) => {
-                return Err(problem(&format!("\"{}\" in the middle of a facet ({n} vertices so far)", shown(word))));
+                return Err(problem(&format!("\"{}\" in the middle of a facet ({n} vertices so far)", escape(word))));
             }
             // The normal, "outer loop", "endloop": they say nothing that the corners do not.
             (b"normal" | b"outer" | b"loop" | b"endloop", Some(_)) => {}
             (_, Some(_)) if float(word).is_some() => {}
             (_, Some(_)) if foreign_number(word).is_some() => return Err(problem(&no_number(word))),
             (b"color", _) => words.name(),
-            _ => return Err(problem(&format!("unexpected \"{}\"", shown(word)))),
+            _ => return Err(problem(&format!("unexpected \"{}\"", escape(word)))),
         }
     }
     let line = words.line;
@@ -332,7 +332,7 @@ fn vertex(words: &mut Words) -> Result<[f64; 3], StlError> {
     let mut ahead = Words { rest: words.rest, line: words.line };
     match ahead.next() {
         Some((word, _)) if float(word).is_some() => {
-            let problem = format!("\"{}\" follows the three numbers of a vertex", shown(word));
+            let problem = format!("\"{}\" follows the three numbers of a vertex", escape(word));
             Err(StlError::Syntax { line: ahead.line, problem })
         }
         _ => Ok(point),

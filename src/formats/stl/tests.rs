@@ -1,6 +1,6 @@
 use super::*;
 
-use crate::formats::{Limits, Nothing};
+use crate::formats::{Limits, NoSiblings};
 use planish_core::mesh::TriangleSoup;
 
 fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
@@ -8,7 +8,7 @@ fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
 }
 
 fn limited(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, ReadError> {
-    super::read(&Source { bytes, limits, beside: &Nothing }).map(|content| content.soup)
+    super::read(&Source { bytes, limits, beside: &NoSiblings }).map(|content| content.soup)
 }
 
 fn facet(x: &str) -> String {
@@ -78,7 +78,7 @@ fn count_and_size_must_agree() {
 }
 
 fn remarks(bytes: &[u8]) -> (usize, Vec<String>) {
-    let content = super::read(&Source { bytes, limits: &Limits::default(), beside: &Nothing }).expect("read");
+    let content = super::read(&Source { bytes, limits: &Limits::default(), beside: &NoSiblings }).expect("read");
     (content.soup.triangles().len(), content.notes.remarks)
 }
 

@@ -1,6 +1,6 @@
 //! Why bytes are no VTK file.
 
-pub(super) use crate::formats::place::{Place, shown};
+pub(super) use crate::formats::place::{Place, escape};
 use crate::outcome::Code;
 
 /// Why bytes are no VTK file, or none with a surface.

@@ -4,7 +4,7 @@
 //! in between (`FIELD`, `METADATA`) is passed over.
 
 use super::cell;
-use super::error::{VtkError, shown};
+use super::error::{VtkError, escape};
 use super::legacy_arrays::Arrays;
 use super::surface::{Cells, Surface, Types};
 use super::unsupported;
@@ -22,7 +22,7 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     match file.keyword()?.as_deref() {
         Some(b"POLYDATA") => polydata(&mut file, &mut surface)?,
         Some(b"UNSTRUCTURED_GRID") => unstructured_grid(&mut file, &mut surface)?,
-        Some(other) => return Err(unsupported(place, &shown(other)).into()),
+        Some(other) => return Err(unsupported(place, &escape(other)).into()),
         None => return Err(file.ends("the kind of the data set").into()),
     }
     surface.finish()
@@ -31,14 +31,14 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
 /// The first lines, up to `DATASET`; the version and encoding.
 fn header(file: &mut Arrays) -> Result<String, VtkError> {
     let first = file.text.line().unwrap_or_default();
-    let version = shown(first.get(HEAD.len()..).unwrap_or_default().trim_ascii());
+    let version = escape(first.get(HEAD.len()..).unwrap_or_default().trim_ascii());
     file.text.line();
     let place = file.place();
     let encoding = match file.keyword()?.as_deref() {
         Some(b"ASCII") => "ASCII",
         Some(b"BINARY") => "binary",
         Some(other) => {
-            let problem = format!("\"{}\" stands where ASCII or BINARY is expected", shown(other));
+            let problem = format!("\"{}\" stands where ASCII or BINARY is expected", escape(other));
             return Err(VtkError::Syntax { place, problem });
         }
         None => return Err(file.ends("ASCII or BINARY")),
@@ -133,7 +133,7 @@ fn unstructured_grid(file: &mut Arrays, surface: &mut Surface) -> Result<(), Vtk
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::{Format, Limits, Nothing, read_alone};
+    use crate::formats::{Format, Limits, NoSiblings, read_alone};
     use crate::outcome::Code;
 
     /// A file as it is written: text, and arrays as text or binary.
@@ -400,7 +400,7 @@ mod tests {
         }
         let bytes = polydata("4.2", true);
         let limits = Limits { elements: 3, ..Limits::default() };
-        let few = crate::formats::read(Format::Vtk, &Source { bytes: &bytes, limits: &limits, beside: &Nothing });
+        let few = crate::formats::read(Format::Vtk, &Source { bytes: &bytes, limits: &limits, beside: &NoSiblings });
         let few = few.expect_err("four points").reason();
         assert_eq!(few.code, Code::TooLarge, "{few:?}");
     }

@@ -1,6 +1,6 @@
 //! The arrays of a legacy file: numbers in text, or big-endian.
 
-use super::error::{Place, VtkError, shown};
+use super::error::{Place, VtkError, escape};
 use super::scalar::{Order, Scalar};
 use super::text::Text;
 use planish_core::vec3::Vec3;
@@ -62,7 +62,7 @@ impl<'a> Arrays<'a> {
 
     /// The error that another keyword is expected here.
     pub fn unexpected(&self, word: &[u8], expected: &str) -> VtkError {
-        self.syntax(format!("unexpected \"{}\" where {expected} may stand", shown(word)))
+        self.syntax(format!("unexpected \"{}\" where {expected} may stand", escape(word)))
     }
 
     fn syntax(&self, problem: String) -> VtkError {
@@ -73,7 +73,7 @@ impl<'a> Arrays<'a> {
     fn count(&mut self, what: &str) -> Result<u64, VtkError> {
         let Some(word) = self.text.word() else { return Err(self.ends(&format!("the number of {what}"))) };
         let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
-        number.ok_or_else(|| self.syntax(format!("\"{}\" is no number of {what}", shown(word))))
+        number.ok_or_else(|| self.syntax(format!("\"{}\" is no number of {what}", escape(word))))
     }
 
     /// A type, and the rest of its line.
@@ -85,7 +85,7 @@ impl<'a> Arrays<'a> {
             b"variant" => Some(Kind::Variant),
             other => Scalar::legacy(other).map(Kind::Number),
         };
-        let kind = kind.ok_or_else(|| self.syntax(format!("\"{}\" is no type of {what}", shown(word))))?;
+        let kind = kind.ok_or_else(|| self.syntax(format!("\"{}\" is no type of {what}", escape(word))))?;
         self.end_of_line();
         Ok(kind)
     }

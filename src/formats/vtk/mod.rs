@@ -36,7 +36,7 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     if text.starts_with(b"<?xml") || text.starts_with(b"<VTKFile") || text.starts_with(b"<!--") {
         return xml::read(&Source { bytes: text, ..*source });
     }
-    let found = error::shown(&bytes[..bytes.len().min(24)]);
+    let found = error::escape(&bytes[..bytes.len().min(24)]);
     Err(VtkError::NoVtk { found }.into())
 }
 

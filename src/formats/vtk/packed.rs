@@ -5,7 +5,7 @@
 //! each block. Nothing is unpacked, and no memory taken, before the sizes in a header are compared with the bytes
 //! that are there and with what the compressor can do at best.
 
-use super::error::{PackedError, shown};
+use super::error::{PackedError, escape};
 use super::scalar::Order;
 use base64::Engine;
 use base64::alphabet::STANDARD;
@@ -178,7 +178,7 @@ const ENGINE: GeneralPurpose = GeneralPurpose::new(
 fn about(run: &[u8]) -> String {
     let is_base64 = |b: &u8| b.is_ascii_alphanumeric() || b"+/=".contains(b);
     let wrong = run.iter().position(|b| !is_base64(b)).unwrap_or_default();
-    format!("\"{}\"", shown(&run[wrong..(wrong + 12).min(run.len())]))
+    format!("\"{}\"", escape(&run[wrong..(wrong + 12).min(run.len())]))
 }
 
 /// The bytes of an array.

@@ -6,7 +6,7 @@ use super::scalar::Scalar;
 use super::vtu::{Grid, Shape, VtuError};
 use super::xml::Arrays;
 use super::xml_outline::{Field, Piece, Role, Section, outline};
-use crate::formats::{Limits, Nothing, Source};
+use crate::formats::{Limits, NoSiblings, Source};
 use planish_core::measure::distortion::CellFields;
 
 /// How every file of planish's begins; compressors came and went.
@@ -54,7 +54,7 @@ fn columns<T>(
         return Err(VtuError::Content("the header"));
     }
     let limits = Limits::default();
-    let source = Source { bytes, limits: &limits, beside: &Nothing };
+    let source = Source { bytes, limits: &limits, beside: &NoSiblings };
     let file = outline(bytes, limits.depth, fields)?;
     let [piece] = &file.pieces[..] else { return Err(VtuError::Content("Piece")) };
     if piece.twice.is_some() {

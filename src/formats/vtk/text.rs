@@ -1,6 +1,6 @@
 //! Words and numbers of text, with the place of what is wrong.
 
-use super::error::{Place, VtkError, shown};
+use super::error::{Place, VtkError, escape};
 use crate::formats::words::{float, remedy};
 use planish_core::vec3::Vec3;
 
@@ -68,7 +68,7 @@ impl<'a> Text<'a> {
         let mut points = vec![[0.0; 3]; count as usize];
         for (there, coordinate) in (0..).zip(points.as_flattened_mut()) {
             let Some(word) = self.word() else { return Err(self.count(what, declared, there)) };
-            let problem = || format!("\"{}\" is no coordinate of {what}{}", shown(word), remedy(word));
+            let problem = || format!("\"{}\" is no coordinate of {what}{}", escape(word), remedy(word));
             *coordinate = float(word).ok_or_else(|| self.syntax(problem()))?;
         }
         Ok(points)
@@ -81,7 +81,7 @@ impl<'a> Text<'a> {
         for (there, id) in (0..).zip(&mut ids) {
             let Some(word) = self.word() else { return Err(self.count(what, count, there)) };
             let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
-            *id = number.ok_or_else(|| self.syntax(format!("\"{}\" is no whole number of {what}", shown(word))))?;
+            *id = number.ok_or_else(|| self.syntax(format!("\"{}\" is no whole number of {what}", escape(word))))?;
         }
         Ok(ids)
     }

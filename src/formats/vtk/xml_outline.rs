@@ -3,7 +3,7 @@
 //! Only tags are looked at, one after the other. Appended data end the search: raw ones are no XML.
 
 use super::cell;
-use super::error::{Place, VtkError, shown};
+use super::error::{Place, VtkError, escape};
 use super::packed::{Compressor, Packing};
 use super::scalar::{Order, Scalar};
 use super::unsupported;
@@ -252,7 +252,7 @@ impl<'a> Search<'a> {
             Some("UnstructuredGrid") => ("UnstructuredGrid", "VTU"),
             Some("PolyData") => ("PolyData", "VTP"),
             None => return Err(self.syntax("<VTKFile> has no type")),
-            Some(other) => return Err(unsupported(self.place(), &shown(other.as_bytes()))),
+            Some(other) => return Err(unsupported(self.place(), &escape(other.as_bytes()))),
         });
         self.packing.order = match attribute(tag, "byte_order") {
             Some("BigEndian") => Order::Big,
@@ -261,7 +261,7 @@ impl<'a> Search<'a> {
         self.packing.wide = match attribute(tag, "header_type") {
             None | Some("UInt32") => false,
             Some("UInt64") => true,
-            Some(other) => return Err(self.syntax(format!("\"{}\" is no header_type", shown(other.as_bytes())))),
+            Some(other) => return Err(self.syntax(format!("\"{}\" is no header_type", escape(other.as_bytes())))),
         };
         self.packing.compressor = match attribute(tag, "compressor") {
             None | Some("") => None,
@@ -269,7 +269,7 @@ impl<'a> Search<'a> {
             Some("vtkLZ4DataCompressor") => Some(Compressor::Lz4),
             Some("vtkLZMADataCompressor") => Some(Compressor::Lzma),
             Some(other) => {
-                let problem = format!("the compressor \"{}\" is not known; save without it", shown(other.as_bytes()));
+                let problem = format!("the compressor \"{}\" is not known; save without it", escape(other.as_bytes()));
                 return Err(self.syntax(problem));
             }
         };
@@ -290,14 +290,14 @@ impl<'a> Search<'a> {
     fn number(&self, tag: &BytesStart, name: &str) -> Result<Option<u64>, VtkError> {
         let Some(text) = attribute(tag, name) else { return Ok(None) };
         let number = text.trim().parse().ok();
-        number.map(Some).ok_or_else(|| self.syntax(format!("{name} is no number: \"{}\"", shown(text.as_bytes()))))
+        number.map(Some).ok_or_else(|| self.syntax(format!("{name} is no number: \"{}\"", escape(text.as_bytes()))))
     }
 
     /// An array of the piece at hand. Where there are several of the same name (steps of time), the first one counts.
     fn array(&mut self, tag: &BytesStart, role: Role) -> Result<Tag, VtkError> {
         let scalar = attribute(tag, "type").unwrap_or_default();
         let Some(scalar) = Scalar::xml(scalar) else {
-            return Err(self.syntax(format!("\"{}\" is no type of {}", shown(scalar.as_bytes()), role.name())));
+            return Err(self.syntax(format!("\"{}\" is no type of {}", escape(scalar.as_bytes()), role.name())));
         };
         let data = match attribute(tag, "format").unwrap_or("ascii") {
             "ascii" => Data::Ascii(&self.bytes[..self.at()], self.at()),
@@ -306,7 +306,7 @@ impl<'a> Search<'a> {
                 Some(offset) => Data::Appended(offset),
                 None => return Err(self.syntax(format!("{} have no offset", role.name()))),
             },
-            other => return Err(self.syntax(format!("\"{}\" is no format of an array", shown(other.as_bytes())))),
+            other => return Err(self.syntax(format!("\"{}\" is no format of an array", escape(other.as_bytes())))),
         };
         let components = self.number(tag, "NumberOfComponents")?;
         let array = Array { at: self.at(), scalar, components, data };
@@ -362,7 +362,7 @@ impl<'a> Search<'a> {
         let base64 = match attribute(tag, "encoding") {
             Some("raw") => false,
             Some("base64") | None => true,
-            Some(other) => return Err(self.syntax(format!("\"{}\" is no encoding", shown(other.as_bytes())))),
+            Some(other) => return Err(self.syntax(format!("\"{}\" is no encoding", escape(other.as_bytes())))),
         };
         let rest = &self.bytes[self.at()..];
         let Some(data) = rest.trim_ascii_start().strip_prefix(b"_") else {

@@ -14,7 +14,7 @@ use crate::output::own;
 use crate::output::replace;
 use crate::output::staging::{self, Bury, Desk, GATE, Run, Settled};
 use crate::system::disk::{self, Disk, Folder, System};
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use crate::system::orphans;
 use crate::system::passing;
 use parking_lot::Mutex;
@@ -93,7 +93,7 @@ pub fn write_to(folder: &Path, files: &[Content]) -> Result<(), PublishError> {
 #[derive(Debug, thiserror::Error)]
 pub enum PublishError {
     /// The system refuses.
-    #[error("cannot write {}: {error}; {}", shown(.path), remedy(.error))]
+    #[error("cannot write {}: {error}; {}", escape(.path), remedy(.error))]
     Io {
         /// Where.
         path: PathBuf,
@@ -106,28 +106,28 @@ pub enum PublishError {
     /// Something stands where the result belongs.
     #[error(
         "{} is there already and is no result of planish: it was left alone; move it away or use another output folder",
-        shown(.0)
+        escape(.0)
     )]
     Foreign(PathBuf),
     /// Something in an older result is not planish's, and cannot be kept.
     #[error(
         "{} lies in an older result, is not of planish, and cannot be kept in the newer one: the older result was left \
-         alone; move that away", shown(.0)
+         alone; move that away", escape(.0)
     )]
     Stands(PathBuf),
     /// Another process holds a lock.
     #[error(
         "{} has been locked by another process for {} s: find it with `fuser -v` and end it, or use another output \
-         folder", shown(.0), own::PATIENCE.as_secs()
+         folder", escape(.0), own::PATIENCE.as_secs()
     )]
     Busy(PathBuf),
     /// A folder on the way is itself a result.
-    #[error("{} is the result of an input: another result cannot lie in it; rename the folder in the inbox", shown(.0))]
+    #[error("{} is the result of an input: another result cannot lie in it; rename the folder in the inbox", escape(.0))]
     Nested(PathBuf),
     /// The place of the result is another file system's.
     #[error(
         "{} is on another file system (a mount point?) than {STAGING} in the output folder: results are put in place by \
-         renaming; unmount it, or use another output folder", shown(.0)
+         renaming; unmount it, or use another output folder", escape(.0)
     )]
     Elsewhere(PathBuf),
     /// The process of the input told this.
@@ -225,7 +225,7 @@ impl<D: Disk> Publisher<D> {
             if !is_open() {
                 return Err(PublishError::Closed);
             }
-            tracing::warn!(folder = shown(&run.path), "the staging folder was removed: another one is made");
+            tracing::warn!(folder = escape(&run.path), "the staging folder was removed: another one is made");
             *run = Arc::new(Run::make(&self.disk, &self.out, self.bury, is_open)?);
         }
         Ok(run.clone())

@@ -4,9 +4,9 @@ mod reloading;
 mod telling;
 
 use super::stop::Stop;
-use super::watcher::{Event, Eyes};
+use super::watcher::{Event, InboxWatcher};
 use crate::conveyor::Conveyor;
-use crate::conveyor::completion::{Done, End, Ended};
+use crate::conveyor::completion::{Completion, Done, End};
 use crate::input::job::Job;
 use crate::operating::metrics::Metrics;
 use crate::operating::status::{self, Counts, Held, Lock, Status, Trouble};
@@ -15,7 +15,7 @@ use crate::output::publish::Publisher;
 use crate::output::retention::Retention;
 use crate::result_files;
 use crate::settings::Settings;
-use crate::system::escape::shown;
+use crate::system::escape::escape;
 use crate::watch::inbox::{Change, Doubt, Inbox, Rest};
 use blake3::Hash;
 pub use reloading::Source;
@@ -70,7 +70,7 @@ pub struct Daemon<'a> {
     conveyor: &'a Conveyor,
     lock: &'a mut Lock,
     publisher: &'a Publisher,
-    eyes: Eyes,
+    watcher: InboxWatcher,
     inbox: Inbox,
     jobs: BTreeMap<PathBuf, Arc<Job>>,
     /// Jobs that may have been taken up with settings that are no longer in force.
@@ -107,7 +107,7 @@ impl<'a> Daemon<'a> {
             conveyor,
             lock,
             publisher,
-            eyes: Eyes::new(inbox, settings.recursive, settings.poll),
+            watcher: InboxWatcher::new(inbox, settings.recursive, settings.poll),
             inbox: Inbox::default(),
             jobs: BTreeMap::new(),
             outdated: BTreeSet::new(),
@@ -144,8 +144,8 @@ impl<'a> Daemon<'a> {
             let event = self.next_event(stop);
             self.untold |= !matches!(event, Event::Tick);
             match event {
-                Event::Hint => self.next_look = self.next_look.min(self.eyes.rested()),
-                Event::Ended(ended) => self.ended(*ended),
+                Event::Hint => self.next_look = self.next_look.min(self.watcher.next_scan()),
+                Event::Completion(ended) => self.ended(*ended),
                 Event::Stop => self.stop(),
                 Event::Reload => self.reload(),
                 Event::Tick => {}
@@ -201,17 +201,17 @@ impl<'a> Daemon<'a> {
             Phase::Stopping(latest) => latest,
         };
         wake = wake.min(self.next_words());
-        self.eyes.wait(self.conveyor, stop, wake)
+        self.watcher.wait(self.conveyor, stop, wake)
     }
 
     /// Looks at the inbox, and does what follows from that.
     fn look(&mut self, now: Instant) {
-        let listing = self.eyes.look();
-        self.next_look = now + self.eyes.period();
-        if let Some(listing) = listing {
+        let snapshot = self.watcher.look();
+        self.next_look = now + self.watcher.period();
+        if let Some(snapshot) = snapshot {
             self.look_for_room();
             self.untold |= self.inbox.due().is_some();
-            for change in self.inbox.look(&listing, now) {
+            for change in self.inbox.look(&snapshot, now) {
                 self.follow(change);
             }
             self.look_for_results(now);
@@ -219,12 +219,12 @@ impl<'a> Daemon<'a> {
             self.warn_of_overdue(now);
             self.look_when_due();
         }
-        self.next_look = self.next_look.max(self.eyes.rested());
+        self.next_look = self.next_look.max(self.watcher.next_scan());
     }
 
     /// The next look comes when a file may have settled, but not before the last one has rested.
     fn look_when_due(&mut self) {
-        let due = self.inbox.due().map(|due| due.max(self.eyes.rested()));
+        let due = self.inbox.due().map(|due| due.max(self.watcher.next_scan()));
         self.next_look = due.map_or(self.next_look, |due| due.min(self.next_look));
     }
 
@@ -233,7 +233,7 @@ impl<'a> Daemon<'a> {
         for name in self.inbox.published(LOOKED_FOR) {
             let report = self.publisher.target(&name).join(result_files::REPORT);
             if fs::symlink_metadata(report).is_err_and(|e| e.kind() == ErrorKind::NotFound) {
-                tracing::info!(input = shown(&name), "its result was removed: it is done again");
+                tracing::info!(input = escape(&name), "its result was removed: it is done again");
                 self.inbox.forget(&name, now);
             }
         }
@@ -241,15 +241,15 @@ impl<'a> Daemon<'a> {
 
     /// Removes some of the results whose time is over.
     fn remove_old_results(&mut self, now: Instant) {
-        let Some(kept) = self.settings.keep_results.filter(|_| self.eyes.is_there()) else { return };
+        let Some(kept) = self.settings.keep_results.filter(|_| self.watcher.is_there()) else { return };
         let jobs = &self.jobs;
-        self.retention.step(now, kept, self.eyes.inbox(), |name| jobs.contains_key(name));
+        self.retention.step(now, kept, self.watcher.inbox(), |name| jobs.contains_key(name));
     }
 
     fn warn_of_overdue(&mut self, now: Instant) {
         for notable in self.inbox.overdue(now, LONG) {
             let minutes = now.saturating_duration_since(notable.since).as_secs() / 60;
-            let (input, state) = (shown(notable.name), notable.state);
+            let (input, state) = (escape(notable.name), notable.state);
             tracing::warn!(input, state, minutes, "is not done: {}", notable.reason);
         }
     }
@@ -257,16 +257,16 @@ impl<'a> Daemon<'a> {
     fn follow(&mut self, change: Change) {
         match change {
             Change::Settled(name, look, since) => {
-                tracing::debug!(input = shown(&name), bytes = look.bytes, "settled");
-                self.submit(Job::of_inbox(self.eyes.inbox(), &name, look, since));
+                tracing::debug!(input = escape(&name), bytes = look.bytes, "settled");
+                self.submit(Job::of_inbox(self.watcher.inbox(), &name, look, since));
             }
             Change::Doubted(name, look, hash) => {
-                self.submit(Job::of_inbox(self.eyes.inbox(), &name, look, Instant::now()).doubting(hash));
+                self.submit(Job::of_inbox(self.watcher.inbox(), &name, look, Instant::now()).doubting(hash));
             }
             Change::Withdrawn(name) => {
                 self.outdated.remove(&name);
                 if let Some(job) = self.jobs.remove(&name) {
-                    tracing::info!(input = shown(&name), "changed or removed: the job is cancelled");
+                    tracing::info!(input = escape(&name), "changed or removed: the job is cancelled");
                     job.cancel();
                 }
             }
@@ -279,7 +279,7 @@ impl<'a> Daemon<'a> {
         self.conveyor.submit(job);
     }
 
-    fn ended(&mut self, Ended { job, end }: Ended) {
+    fn ended(&mut self, Completion { job, end }: Completion) {
         if let Some(done) = end.standing().filter(|done| !done.up_to_date) {
             self.status.ended.count(done.report.status);
             self.status.last_published = Some(status::now());
@@ -301,7 +301,7 @@ impl<'a> Daemon<'a> {
         let (name, now) = (&job.name, Instant::now());
         let Some(look) = &job.look else { return };
         if job.doubted.is_none() {
-            self.eyes.look_beside(name, job.beside());
+            self.watcher.look_beside(name, job.beside());
         }
         match end {
             End::Done(done) => {
@@ -318,13 +318,13 @@ impl<'a> Daemon<'a> {
             }
             End::Held(_, why) => {
                 if self.inbox.failed(name, look, now, why) == 1 {
-                    let of_job = tracing::info_span!("job", input = shown(name));
+                    let of_job = tracing::info_span!("job", input = escape(name));
                     of_job.in_scope(|| tracing::info!("{why}"));
                 }
             }
             // What it waits for is part of what is seen of it now.
             End::Waiting(reason) => {
-                tracing::info!(input = shown(name), "waits: {}", reason.message);
+                tracing::info!(input = escape(name), "waits: {}", reason.message);
                 self.inbox.done(name, look, Rest::Waits(reason.message), None);
             }
             End::Changed | End::Outdated(_) => self.inbox.again(name, look, now + SOON, "it has changed"),
@@ -348,7 +348,7 @@ impl<'a> Daemon<'a> {
             }
             End::Lost => {
                 let message = "a stage broke down: that is a fault of planish; please report it";
-                self.must_be_seen_to(format!("{}: {message}", shown(name)));
+                self.must_be_seen_to(format!("{}: {message}", escape(name)));
                 self.inbox.failed(name, look, now, message);
             }
         }

@@ -1,4 +1,4 @@
-//! The turnstile and the budget of the conveyor under thousands of orders of threads: no deadlock, no lost wake-up, never
+//! The semaphore and the budget of the conveyor under thousands of orders of threads: no deadlock, no lost wake-up, never
 //! more inside than there is room for. `cargo run --release --example schedules -- ORDERS`.
 //!
 //! The files are those of the program, with locks that shuttle schedules; orders are random, and by priorities that change
@@ -8,37 +8,37 @@
 #[path = "../../../src/conveyor/budget.rs"]
 #[allow(dead_code, missing_docs)]
 mod budget;
-#[allow(missing_docs)]
-mod sync;
 #[path = "../../../src/conveyor/semaphore.rs"]
 #[allow(dead_code, missing_docs)]
-mod turnstile;
+mod semaphore;
+#[allow(missing_docs)]
+mod sync;
 
 /// What the files above take from the queue.
 #[allow(missing_docs)]
 mod queue {
     pub type Turn = u64;
-    pub const BELTS: usize = 3;
+    pub const LANES: usize = 3;
 }
 
 use budget::{Account, Budget};
+use semaphore::PrioritySemaphore;
 use shuttle::thread;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use turnstile::Turnstile;
 
 /// Four computations for two places; each lets others pass on its way.
 fn computations() {
-    let (turnstile, inside) = (Arc::new(Turnstile::new(2)), Arc::new(AtomicUsize::new(0)));
+    let (semaphore, inside) = (Arc::new(PrioritySemaphore::new(2)), Arc::new(AtomicUsize::new(0)));
     let compute = |turn: u64| {
-        let (turnstile, inside) = (turnstile.clone(), inside.clone());
+        let (semaphore, inside) = (semaphore.clone(), inside.clone());
         move || {
-            turnstile.enter(turn);
+            semaphore.enter(turn);
             assert!(inside.fetch_add(1, Ordering::SeqCst) < 2, "too many inside");
             inside.fetch_sub(1, Ordering::SeqCst);
-            turnstile.let_pass(turn);
-            turnstile.leave();
+            semaphore.yield_to(turn);
+            semaphore.leave();
         }
     };
     let threads: Vec<_> = [30, 10, 20, 10].map(|turn| thread::spawn(compute(turn))).into();
@@ -47,25 +47,25 @@ fn computations() {
 
 /// Inputs hold memory while their factorisations wait for more, in places that they leave for that, as the conveyor does.
 fn jobs() {
-    let turnstile = Arc::new(Turnstile::new(1));
+    let semaphore = Arc::new(PrioritySemaphore::new(1));
     let (budget, factors) = (Arc::new(Budget::new(100)), Arc::new(AtomicU64::new(0)));
     let job = |turn: u64, input: u64, factor: u64| {
-        let (turnstile, budget, factors) = (turnstile.clone(), budget.clone(), factors.clone());
+        let (semaphore, budget, factors) = (semaphore.clone(), budget.clone(), factors.clone());
         move || {
-            let belt = Account::Input(turn as usize % 2);
-            budget.take(belt, input, turn);
-            turnstile.enter(turn);
+            let lane = Account::Input(turn as usize % 2);
+            budget.take(lane, input, turn);
+            semaphore.enter(turn);
             if !budget.try_take(Account::Factor, factor) {
-                turnstile.leave();
+                semaphore.leave();
                 budget.take(Account::Factor, factor, turn);
-                turnstile.enter(turn);
+                semaphore.enter(turn);
             }
             let together = factors.fetch_add(factor, Ordering::SeqCst) + factor;
             assert!(together <= 100 || together == factor, "{together} bytes of factors");
             factors.fetch_sub(factor, Ordering::SeqCst);
             budget.give_back(Account::Factor, factor);
-            turnstile.leave();
-            budget.give_back(belt, input);
+            semaphore.leave();
+            budget.give_back(lane, input);
         }
     };
     let threads = [(1, 60, 70), (2, 80, 30), (3, 500, 10), (4, 10, 200)];

@@ -3,7 +3,7 @@
 mod files;
 
 use super::error::{PackedError, VtkError};
-use crate::formats::{Content, Format, Limits, Nothing, ReadError, Source, read_alone};
+use crate::formats::{Content, Format, Limits, NoSiblings, ReadError, Source, read_alone};
 use crate::outcome::Code;
 use files::{Encoding, PLAIN, Style, compress, grid, polydata, styles, xz};
 
@@ -15,7 +15,7 @@ fn error(bytes: &[u8]) -> VtkError {
 }
 
 fn limited(bytes: &[u8], limits: Limits) -> Result<Content, ReadError> {
-    crate::formats::read(Format::Vtu, &Source { bytes, limits: &limits, beside: &Nothing })
+    crate::formats::read(Format::Vtu, &Source { bytes, limits: &limits, beside: &NoSiblings })
 }
 
 #[test]
