@@ -122,7 +122,10 @@ pub fn gmsh(
 fn natural_maps(mesh: &SurfaceMesh, charts: &[Chart], distortions: &[Summary]) -> Vec<Option<Natural>> {
     let of_chart = |(chart, on_disk): (&Chart, &Summary)| {
         let p99 = on_disk.conformal_p99;
-        (p99 > BENT).then(|| natural(mesh, chart, p99, &NoMonitor)).flatten()
+        if p99 <= BENT {
+            return None;
+        }
+        natural(mesh, chart, p99, &NoMonitor).expect("nobody interrupts")
     };
     charts.iter().zip(distortions).map(of_chart).collect()
 }

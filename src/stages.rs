@@ -313,7 +313,7 @@ pub fn untangle(
 fn not_mapped(error: SplitError) -> Stopped {
     let code = match &error {
         SplitError::Interrupted(_) => return Stopped::Unwanted,
-        SplitError::Map(MapError::Linear(linear::Error::Solver(sparse::Error::TooLarge { .. }))) => Code::TooLarge,
+        SplitError::Map(MapError::Linear(linear::Error::Solver(sparse::Unsolvable::TooLarge { .. }))) => Code::TooLarge,
         SplitError::Map(_) => Code::NeedsSplit,
         SplitError::Split(_) => Code::Internal,
     };

@@ -14,7 +14,7 @@ use crate::map::quadratic::{QuadraticMap, least_det, quadratic_map};
 use crate::measure::distortion;
 use crate::mesh::SurfaceMesh;
 use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
-use crate::untangle::{self, Untangled, untangle};
+use crate::untangle::{self, Dirichlet, Untangled, untangle};
 use cut::{Attempt, Cutter};
 
 /// The order of the finite elements.
@@ -35,7 +35,7 @@ pub struct MappedChart {
     linear: LinearMap,
     start: Vec<GridPoint>,
     certified_start: CertifiedMap,
-    harmonic: Option<Result<QuadraticMap, sparse::Error>>,
+    harmonic: Option<Result<QuadraticMap, sparse::Unsolvable>>,
 }
 
 impl MappedChart {
@@ -56,7 +56,7 @@ impl MappedChart {
 pub enum MapError {
     /// No linear map.
     #[error(transparent)]
-    Linear(#[from] linear::Error),
+    Linear(linear::Error),
     /// The raised linear map is not one-to-one in double precision.
     #[error("the chart is too distorted for one map: {0}; it must be split")]
     Start(certify::Error),
@@ -71,6 +71,15 @@ pub enum MapError {
     /// The map was not wanted any more.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
+}
+
+impl From<linear::Error> for MapError {
+    fn from(error: linear::Error) -> Self {
+        match error {
+            linear::Error::Interrupted(interrupted) => Self::Interrupted(interrupted),
+            error => Self::Linear(error),
+        }
+    }
 }
 
 impl MapError {
@@ -94,7 +103,7 @@ pub struct CertifiedChart {
     /// What untangling did, where there was a harmonic map.
     pub untangle: Option<untangle::Report>,
     /// Why there is no harmonic map although it was asked for: the map is the raised linear one then.
-    pub unsolved: Option<sparse::Error>,
+    pub unsolved: Option<sparse::Unsolvable>,
 }
 
 /// The harmonic map in numbers.
@@ -131,10 +140,8 @@ pub fn map_within(
     checkpoint.after(size)?;
     let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
     let mut boundary = Boundary::circle(&closed, mids);
-    let linear = linear_map(&closed, &boundary, monitor);
-    // Before its error is believed: it may have been interrupted.
+    let linear = linear_map(&closed, &boundary, monitor)?;
     checkpoint.end()?;
-    let linear = linear?;
     lower_ears(&closed, &linear, &mut boundary);
     let start = linear.raised(&closed, &boundary);
     let centres = (0..closed.loops().len()).map(|k| start[closed.centre_node(k)]).collect();
@@ -146,7 +153,12 @@ pub fn map_within(
         if ratio > bound { Err(stretched()) } else { Ok(()) }
     };
     within(ratio, if order == Order::Linear { max_area_ratio } else { HOPELESS * max_area_ratio })?;
-    let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary, monitor));
+    let harmonic = match (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary, monitor)) {
+        None => None,
+        Some(Ok(map)) => Some(Ok(map)),
+        Some(Err(sparse::Error::Unsolvable(unsolvable))) => Some(Err(unsolvable)),
+        Some(Err(sparse::Error::Interrupted(interrupted))) => return Err(interrupted.into()),
+    };
     if let Some(Ok(map)) = &harmonic {
         let of_harmonic = distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n]));
         within(ratio.sqrt() * of_harmonic.sqrt(), max_area_ratio)?;
@@ -228,11 +240,14 @@ impl From<decompose::Error> for SplitError {
 /// Untangles the harmonic map of a chart and certifies the result; where that cannot be proven, the result is the
 /// feasible start.
 pub fn finish_chart(mapped: MappedChart) -> CertifiedChart {
-    finish(mapped, &NoMonitor)
+    finish(mapped, &NoMonitor).expect("nobody interrupts")
 }
 
-/// As [`finish_chart`]. Where nobody waits for the result any more, it is unfinished.
-fn finish(mapped: MappedChart, monitor: &dyn Monitor) -> CertifiedChart {
+/// As [`finish_chart`].
+///
+/// # Errors
+/// [`Interrupted`].
+fn finish(mapped: MappedChart, monitor: &dyn Monitor) -> Result<CertifiedChart, Interrupted> {
     let MappedChart { closed, linear, start, certified_start, harmonic } = mapped;
     let of_start = |start: CertifiedMap, linear, unsolved| CertifiedChart {
         certified: start.clone(),
@@ -243,14 +258,15 @@ fn finish(mapped: MappedChart, monitor: &dyn Monitor) -> CertifiedChart {
         unsolved,
     };
     let map = match harmonic {
-        None => return of_start(certified_start, linear, None),
-        Some(Err(unsolved)) => return of_start(certified_start, linear, Some(unsolved)),
+        None => return Ok(of_start(certified_start, linear, None)),
+        Some(Err(unsolved)) => return Ok(of_start(certified_start, linear, Some(unsolved))),
         Some(Ok(map)) => map,
     };
     let mut invalid = vec![false; closed.own_triangles()];
     map.invalid().iter().for_each(|f| invalid[f.index()] = true);
     let found = Harmonic { invalid, det_min: least_det(&closed, &map) };
-    let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &start, &map, monitor);
+    let energy = Dirichlet::new(closed.shapes());
+    let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &energy, &start, &map, monitor)?;
     let certified = match prove(planar(&closed, &nodes, hole_centres)) {
         Ok(certified) => certified,
         Err(_) => {
@@ -259,7 +275,7 @@ fn finish(mapped: MappedChart, monitor: &dyn Monitor) -> CertifiedChart {
         }
     };
     let (harmonic, untangle) = (Some(found), Some(report));
-    CertifiedChart { certified, start: certified_start, linear, harmonic, untangle, unsolved: None }
+    Ok(CertifiedChart { certified, start: certified_start, linear, harmonic, untangle, unsolved: None })
 }
 
 /// As [`finish_chart`], where `chart`, a part of `mesh`, is split and mapped again if its certified map is more distorted
@@ -280,7 +296,7 @@ pub fn finish_or_split(
     let mut finished = Vec::new();
     let mut waiting = vec![(chart, mapped)];
     while let Some((chart, mapped)) = waiting.pop() {
-        let done = finish(mapped, monitor);
+        let done = finish(mapped, monitor)?;
         checkpoint.end()?;
         match split_if_stretched(mesh, &chart, &done.certified, settings, monitor)? {
             None => finished.push((chart, done)),
@@ -335,7 +351,9 @@ mod tests {
         assert!(strips.len() >= 2, "{}", strips.len());
         for strip in &strips {
             assert!(strip.holes().is_empty());
-            let natural = crate::map::natural::natural(&mesh, strip, f64::MAX, &NoMonitor).expect("it unrolls");
+            let natural = crate::map::natural::natural(&mesh, strip, f64::MAX, &NoMonitor)
+                .expect("not interrupted")
+                .expect("it unrolls");
             assert!(natural.distortion.conformal_p99 < 4.0, "{:?}", natural.distortion);
         }
         let (_, whole) = parts(&shapes::tube(36, 6, 3.0));
@@ -354,7 +372,8 @@ mod tests {
     fn a_tall_box_falls_into_parts_that_unroll_and_a_low_one_stays_whole() {
         let (mesh, walls) = parts(&open_box(100.0));
         assert!((2..=3).contains(&walls.len()), "{}", walls.len());
-        let unrolls = |part| crate::map::natural::natural(&mesh, part, f64::MAX, &NoMonitor).is_some();
+        let unrolls =
+            |part| crate::map::natural::natural(&mesh, part, f64::MAX, &NoMonitor).expect("not interrupted").is_some();
         assert!(walls.iter().all(unrolls));
         let (_, whole) = parts(&open_box(12.0));
         assert_eq!(whole.len(), 1, "it stretches, but no more than others");

@@ -223,7 +223,7 @@ mod tests {
                     assert!(monitor.reserved.load(Relaxed) as usize >= 8 * analysis.factor_entries());
                     drop(factor);
                 }
-                Err(error) => assert_eq!(error, sparse::Error::Singular { unknowns: 2 }),
+                Err(error) => assert_eq!(error, sparse::Unsolvable::Singular { unknowns: 2 }.into()),
             }
             assert!(monitor.most() >= 8 * analysis.factor_entries());
             let broken = catch_unwind(AssertUnwindSafe(|| {

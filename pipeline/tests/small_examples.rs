@@ -10,7 +10,7 @@ use planish_core::map::linear::{self, Method, folded, harmonic_places, linear_ma
 use planish_core::map::quadratic::{QuadraticMap, quadratic_map};
 use planish_core::mesh::TriangleSoup;
 use planish_core::monitor::NoMonitor;
-use planish_core::untangle::untangle;
+use planish_core::untangle::{Dirichlet, untangle};
 use planish_core::vec3::{Vec3, distance};
 use planish_core::{decompose, repair, shapes};
 use std::f64::consts::TAU;
@@ -92,7 +92,8 @@ impl Example {
             let start = m_matrix.raised(&self.chart, &boundary);
             let harmonic = self.quadratic(mids);
             assert!(!harmonic.invalid().is_empty());
-            let got = untangle(&self.chart, &start, &harmonic, &NoMonitor);
+            let got = untangle(&self.chart, &Dirichlet::new(self.chart.shapes()), &start, &harmonic, &NoMonitor)
+                .expect("ends");
             assert!(got.report.energy < got.report.energy_start && got.report.energy > got.report.energy_harmonic);
             let cells = (0..self.chart.triangles().len()).map(|f| self.chart.nodes(f).map(|n| n as u32)).collect();
             let proven = prove(PlanarMap { cells, nodes: got.nodes, hole_centres: got.hole_centres });

@@ -12,12 +12,12 @@
 
 use crate::fem::assembly::Assembly;
 use crate::fem::dofs::Dofs;
-use crate::fem::sparse::{self, Analysis, Pattern};
+use crate::fem::sparse::{self, Analysis, Pattern, Unsolvable};
 use crate::grid::{GridPoint, orientation};
 use crate::map::boundary::Boundary;
 use crate::map::closed::ClosedChart;
 use crate::map::weights;
-use crate::monitor::Monitor;
+use crate::monitor::{Interrupted, Monitor};
 use crate::topology::{EdgeId, FaceId, HalfEdgeId};
 
 /// After this many rounds of local changes, all negative edges are changed at once.
@@ -59,7 +59,19 @@ pub enum Error {
     },
     /// The system could not be solved.
     #[error("linear map: {0}")]
-    Solver(#[from] sparse::Error),
+    Solver(#[from] sparse::Unsolvable),
+    /// The map was not wanted any more.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+impl From<sparse::Error> for Error {
+    fn from(error: sparse::Error) -> Self {
+        match error {
+            sparse::Error::Unsolvable(unsolvable) => Self::Solver(unsolvable),
+            sparse::Error::Interrupted(interrupted) => Self::Interrupted(interrupted),
+        }
+    }
 }
 
 impl LinearMap {
@@ -104,7 +116,7 @@ impl LinearMap {
 /// Maps `chart` with its outer loop on the vertices of `boundary`.
 ///
 /// # Errors
-/// [`Error::Folded`] when the chart must be split; [`Error::Solver`].
+/// [`Error::Folded`] when the chart must be split; [`Error::Solver`]; [`Error::Interrupted`].
 pub fn linear_map(chart: &ClosedChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<LinearMap, Error> {
     let dofs = dofs(chart);
     let pattern = edge_pattern(chart, &dofs);
@@ -144,7 +156,7 @@ fn attempt(system: &System, weights: &[f64]) -> Result<(Vec<GridPoint>, Vec<Face
             let folds = folded(system.chart, &places);
             Ok((places, folds))
         }
-        Err(sparse::Error::Singular { .. }) => {
+        Err(sparse::Error::Unsolvable(Unsolvable::Singular { .. })) => {
             Ok((Vec::new(), (0..system.chart.triangles().len()).map(FaceId::at).collect()))
         }
         Err(error) => Err(error.into()),
@@ -167,7 +179,7 @@ pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary, monitor: &dyn Mo
 /// The harmonic P1 map as it is, folded or not: per vertex its place.
 ///
 /// # Errors
-/// [`Error::Solver`].
+/// [`Error::Solver`]; [`Error::Interrupted`].
 pub fn harmonic_places(
     chart: &ClosedChart,
     boundary: &Boundary,

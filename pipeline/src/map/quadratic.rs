@@ -53,7 +53,7 @@ impl QuadraticMap {
 /// Computes the harmonic map of `chart` with its outer loop on `boundary`.
 ///
 /// # Errors
-/// [`sparse::Error`] when the system cannot be factorised.
+/// [`sparse::Error`]: the system cannot be factorised, or interrupted.
 pub fn quadratic_map(
     chart: &ClosedChart,
     boundary: &Boundary,

@@ -1,7 +1,7 @@
 //! Untangle: towards the harmonic map, inside the certified ones.
 //!
-//! Minimises the Dirichlet energy 1/2 int |grad u|^2 + |grad v|^2 (on the surface: distortion is measured against
-//! the triangles in space) under the constraint that every jacobian is positive, with the outer boundary fixed.
+//! Minimises an [`Objective`], the [`Dirichlet`] energy (on the surface: distortion is measured against the triangles in
+//! space), under the constraint that every jacobian is positive, with the outer boundary fixed.
 //!
 //! * **Nothing to do** where the harmonic map is valid and every hole can be seen from a point inside.
 //! * **The patch path**, where few triangles are invalid: only a few rings around them move. A regularised penalty
@@ -20,6 +20,7 @@
 
 mod feasible;
 mod newton;
+mod objective;
 mod patch;
 mod penalty;
 mod problem;
@@ -27,11 +28,14 @@ mod region;
 mod terms;
 
 use crate::certify::{Arc, star_centre};
+use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::map::closed::ClosedChart;
-use crate::map::quadratic::{self, QuadraticMap, energy, invalid_triangles};
-use crate::monitor::{Checkpoint, Monitor};
-use problem::Places;
+use crate::map::quadratic::{self, QuadraticMap, invalid_triangles};
+use crate::monitor::{Checkpoint, Interrupted, Monitor};
+use crate::topology::FaceId;
+pub use objective::{Dirichlet, LocalModel, Objective};
+use patch::Stuck;
 
 /// Above this share of invalid triangles the feasible path is taken at once.
 const FEW: f64 = 0.1;
@@ -106,48 +110,89 @@ impl Effort {
     }
 }
 
-/// Untangles the harmonic map of `chart`; `start` is the valid raised linear map with the same boundary, and the result
-/// where nobody waits for a better one any more.
-pub fn untangle(chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap, monitor: &dyn Monitor) -> Untangled {
+/// Untangles the `harmonic` map of `chart`, the minimiser of `objective` that may be invalid; `start` is the valid
+/// raised linear map with the same boundary. The result is the start itself where nothing better is found.
+///
+/// # Errors
+/// [`Interrupted`].
+pub fn untangle<O: Objective>(
+    chart: &ClosedChart,
+    objective: &O,
+    start: &[GridPoint],
+    harmonic: &QuadraticMap,
+    monitor: &dyn Monitor,
+) -> Result<Untangled, Interrupted> {
     let mut effort = Effort::default();
-    let (method, nodes, hole_centres) = best(chart, start, harmonic, &mut effort, &Checkpoint::new(monitor));
+    let found = best(chart, objective, start, harmonic, &mut effort, &Checkpoint::new(monitor))?;
     let report = Report {
-        method,
+        method: found.method,
         iterations: effort.iterations,
-        nodes_moved: nodes_moved(chart, &nodes, harmonic),
-        energy_harmonic: harmonic.energy(),
-        energy_start: energy(chart, start),
-        energy: energy(chart, &nodes),
+        nodes_moved: nodes_moved(chart, &found.nodes, harmonic),
+        energy_harmonic: total(chart, objective, harmonic.places()),
+        energy_start: total_on_grid(chart, objective, start),
+        energy: total_on_grid(chart, objective, &found.nodes),
         gradient_norm: effort.decrement.max(0.0).sqrt(),
     };
-    Untangled { nodes, hole_centres, report }
+    Ok(Untangled { nodes: found.nodes, hole_centres: found.hole_centres, report })
+}
+
+/// The objective over all triangles, those of the fans included.
+fn total<O: Objective>(chart: &ClosedChart, objective: &O, x: &[[f64; 2]]) -> f64 {
+    (0..chart.triangles().len()).map(|f| objective.value(FaceId::at(f), &chart.nodes(f).map(|n| x[n]))).sum()
+}
+
+fn total_on_grid<O: Objective>(chart: &ClosedChart, objective: &O, nodes: &[GridPoint]) -> f64 {
+    total(chart, objective, &places(nodes, &[]))
+}
+
+/// A valid map, with the way to it.
+struct Found {
+    method: Method,
+    nodes: Vec<GridPoint>,
+    hole_centres: Vec<GridPoint>,
 }
 
 /// The first of the paths that leads to a valid map.
-fn best(
+fn best<O: Objective>(
     chart: &ClosedChart,
+    objective: &O,
     start: &[GridPoint],
     harmonic: &QuadraticMap,
     effort: &mut Effort,
     checkpoint: &Checkpoint,
-) -> (Method, Vec<GridPoint>, Vec<GridPoint>) {
-    if let Some(centres) = valid(chart, harmonic.nodes()) {
-        return (Method::Harmonic, harmonic.nodes().to_vec(), centres);
+) -> Result<Found, Interrupted> {
+    let found = |method: Method, nodes: Vec<GridPoint>| {
+        valid(chart, &nodes).map(|hole_centres| Found { method, nodes, hole_centres })
+    };
+    if let Some(found) = found(Method::Harmonic, harmonic.nodes().to_vec()) {
+        return Ok(found);
     }
     if harmonic.invalid().len() as f64 <= FEW * chart.own_triangles() as f64 {
-        let nodes = patch::untangle(chart, start, harmonic, effort, checkpoint);
-        if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
-            return (Method::Patch, nodes.unwrap_or_default(), centres);
+        match patch::untangle(chart, objective, start, harmonic, effort, checkpoint) {
+            Ok(nodes) => {
+                if let Some(found) = found(Method::Patch, nodes) {
+                    return Ok(found);
+                }
+            }
+            Err(Stuck::Interrupted(interrupted)) => return Err(interrupted),
+            // Then the whole chart moves.
+            Err(_) => {}
         }
     }
     effort.decrement = 0.0;
-    let nodes = feasible::untangle(chart, start, effort, checkpoint);
-    if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
-        return (Method::Feasible, nodes.unwrap_or_default(), centres);
+    match feasible::untangle(chart, objective, start, effort, checkpoint) {
+        Ok(nodes) => {
+            if let Some(found) = found(Method::Feasible, nodes) {
+                return Ok(found);
+            }
+        }
+        Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted),
+        // Then the start is what there is.
+        Err(sparse::Error::Unsolvable(_)) => {}
     }
     effort.decrement = 0.0;
-    let centres = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-    (Method::Start, start.to_vec(), centres)
+    let hole_centres = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
+    Ok(Found { method: Method::Start, nodes: start.to_vec(), hole_centres })
 }
 
 /// If the map is valid and every hole can be seen from a point, these points.
@@ -168,12 +213,12 @@ fn arc(chart: &ClosedChart, nodes: &[GridPoint], h: crate::topology::HalfEdgeId)
 }
 
 /// Places of all nodes as doubles, followed by the star centres.
-fn places(nodes: &[GridPoint], centres: &[GridPoint]) -> Places {
+fn places(nodes: &[GridPoint], centres: &[GridPoint]) -> Vec<[f64; 2]> {
     nodes.iter().chain(centres).map(|p| p.uv()).collect()
 }
 
 /// The nodes of `x` on the grid.
-fn on_grid(chart: &ClosedChart, x: &Places) -> Vec<GridPoint> {
+fn on_grid(chart: &ClosedChart, x: &[[f64; 2]]) -> Vec<GridPoint> {
     quadratic::to_grid(chart, &x[..chart.node_count()])
 }
 

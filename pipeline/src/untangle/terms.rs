@@ -1,62 +1,41 @@
 //! The constrained quantities, their gradients, and the part of their curvature that is kept.
 
+use super::objective::SCALARS;
 use crate::fem::jacobian::{AT_CORNERS, PAIRS, cross};
 use crate::mesh::TriangleShape;
 
-/// A Hermitian form in the six complex nodal values u + i v: real and imaginary parts.
-pub(super) struct Form {
-    re: [[f64; 6]; 6],
-    im: [[f64; 6]; 6],
+/// Adds the square `weight` |sum over n of (r_n + i s_n) w_n|^2 of a complex-linear form in the nodal values
+/// w = u + i v, as a matrix over (u0, v0, u1, ...). Only the lower triangle counts.
+fn add_square(hessian: &mut [[f64; SCALARS]; SCALARS], weight: f64, r: &[f64; 6], s: &[f64; 6]) {
+    for m in 0..6 {
+        for n in 0..=m {
+            let re = weight * (r[m] * r[n] + s[m] * s[n]);
+            let im = weight * (r[m] * s[n] - s[m] * r[n]);
+            hessian[2 * m][2 * n] += re;
+            hessian[2 * m + 1][2 * n + 1] += re;
+            hessian[2 * m][2 * n + 1] -= im;
+            hessian[2 * m + 1][2 * n] += im;
+        }
+    }
 }
 
-impl Form {
-    /// The Dirichlet energy's.
-    pub fn of_stiffness(stiffness: [[f64; 6]; 6]) -> Self {
-        Self { re: stiffness, im: [[0.0; 6]; 6] }
-    }
-
-    /// Adds `weight` |sum over n of (r_n + i s_n) w_n|^2.
-    fn add_square(&mut self, weight: f64, r: &[f64; 6], s: &[f64; 6]) {
-        for m in 0..6 {
-            for n in 0..6 {
-                self.re[m][n] += weight * (r[m] * r[n] + s[m] * s[n]);
-                self.im[m][n] += weight * (r[m] * s[n] - s[m] * r[n]);
-            }
+/// Adds the curvature of penalties with the slopes `-push` in the six coefficients.
+///
+/// In an orthonormal frame of the triangle in space, each coefficient is a difference of squares: with the
+/// complex derivatives P (along z) and N (along the conjugate of z) at the corners, M_ii = |P_i|^2 - |N_i|^2
+/// and M_ij = Re(P_i conj P_j) - Re(N_i conj N_j). A falling penalty curves upwards along the negative
+/// squares and downwards along the positive ones; the former are kept, exactly, the latter dropped. So the
+/// matrix stays positive, whatever the rounding, and no eigenvalues are needed.
+pub(super) fn add_curvature(hessian: &mut [[f64; SCALARS]; SCALARS], shape: &TriangleShape, push: &[f64; 6]) {
+    let (p, n) = complex_derivatives(shape);
+    for (k, (i, j)) in PAIRS.into_iter().enumerate() {
+        if i == j {
+            add_square(hessian, 2.0 * push[k], &n[i].0, &n[i].1);
+            continue;
         }
-    }
-
-    /// Adds the curvature of penalties with the slopes `-push` in the six coefficients.
-    ///
-    /// In an orthonormal frame of the triangle in space, each coefficient is a difference of squares: with the
-    /// complex derivatives P (along z) and N (along the conjugate of z) at the corners, M_ii = |P_i|^2 - |N_i|^2
-    /// and M_ij = Re(P_i conj P_j) - Re(N_i conj N_j). A falling penalty curves upwards along the negative
-    /// squares and downwards along the positive ones; the former are kept, exactly, the latter dropped. So the
-    /// matrix stays positive, whatever the rounding, and no eigenvalues are needed.
-    pub fn add_curvature(&mut self, shape: &TriangleShape, push: &[f64; 6]) {
-        let (p, n) = complex_derivatives(shape);
-        for (k, (i, j)) in PAIRS.into_iter().enumerate() {
-            if i == j {
-                self.add_square(2.0 * push[k], &n[i].0, &n[i].1);
-                continue;
-            }
-            let combine = |a: &[f64; 6], b: &[f64; 6], sign: f64| std::array::from_fn(|m| a[m] + sign * b[m]);
-            self.add_square(0.5 * push[k], &combine(&p[i].0, &p[j].0, -1.0), &combine(&p[i].1, &p[j].1, -1.0));
-            self.add_square(0.5 * push[k], &combine(&n[i].0, &n[j].0, 1.0), &combine(&n[i].1, &n[j].1, 1.0));
-        }
-    }
-
-    /// The real symmetric matrix over (u0, v0, u1, ...).
-    pub fn matrix(&self) -> [[f64; 12]; 12] {
-        let mut h = [[0.0; 12]; 12];
-        for m in 0..6 {
-            for n in 0..6 {
-                h[2 * m][2 * n] = self.re[m][n];
-                h[2 * m + 1][2 * n + 1] = self.re[m][n];
-                h[2 * m][2 * n + 1] = -self.im[m][n];
-                h[2 * m + 1][2 * n] = self.im[m][n];
-            }
-        }
-        h
+        let combine = |a: &[f64; 6], b: &[f64; 6], sign: f64| std::array::from_fn(|m| a[m] + sign * b[m]);
+        add_square(hessian, 0.5 * push[k], &combine(&p[i].0, &p[j].0, -1.0), &combine(&p[i].1, &p[j].1, -1.0));
+        add_square(hessian, 0.5 * push[k], &combine(&n[i].0, &n[j].0, 1.0), &combine(&n[i].1, &n[j].1, 1.0));
     }
 }
 
@@ -158,12 +137,12 @@ mod tests {
         for k in 0..6 {
             let mut push = [0.0; 6];
             push[k] = 1.0;
-            let mut form = Form::of_stiffness([[0.0; 6]; 6]);
-            form.add_curvature(&shape, &push);
-            let h = form.matrix();
+            let mut h = [[0.0; SCALARS]; SCALARS];
+            add_curvature(&mut h, &shape, &push);
+            let entry = |i: usize, j: usize| h[i.max(j)][i.min(j)];
             for (direction, sign) in [(&X, 1.0), (&Y, -1.0)] {
                 let d: Vec<f64> = direction.iter().flatten().map(|c| c * sign).collect();
-                let kept: f64 = (0..12).map(|i| (0..12).map(|j| d[i] * h[i][j] * d[j]).sum::<f64>()).sum();
+                let kept: f64 = (0..12).map(|i| (0..12).map(|j| d[i] * entry(i, j) * d[j]).sum::<f64>()).sum();
                 let curvature = -2.0 * Corners::new(direction).dets()[k];
                 assert!(kept >= 0.0 && kept >= curvature - 1e-12, "{k}: {kept} {curvature}");
             }

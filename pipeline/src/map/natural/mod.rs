@@ -16,10 +16,11 @@ mod projection;
 
 use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
+use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, quantiles, singular_ratio};
 use crate::mesh::SurfaceMesh;
-use crate::monitor::Monitor;
+use crate::monitor::{Interrupted, Monitor};
 pub use conformal::conformal;
 pub use projection::projection;
 
@@ -51,15 +52,29 @@ const EVEN: f64 = 100.0;
 
 /// A natural map that stretches `chart`, one of `mesh`, less than `on_disk`, the conformal distortion that its map on
 /// the disk does not exceed on 99 % of the area; none where there is none, or that is not found by reasonable means.
-pub fn natural(mesh: &SurfaceMesh, chart: &Chart, on_disk: f64, monitor: &dyn Monitor) -> Option<Natural> {
-    let unrolled = || {
-        let is_wanted = on_disk > UNEVEN && chart.triangles().len() <= UNROLLED;
-        // Where the system cannot be solved, there is the map on the disk.
-        let found = is_wanted.then(|| conformal(chart, monitor).ok()).flatten().flatten();
-        found.filter(|n| n.distortion.conformal_p99 < on_disk)
-    };
+///
+/// # Errors
+/// [`Interrupted`].
+pub fn natural(
+    mesh: &SurfaceMesh,
+    chart: &Chart,
+    on_disk: f64,
+    monitor: &dyn Monitor,
+) -> Result<Option<Natural>, Interrupted> {
     let is_even = |n: &Natural| n.distortion.area_ratio < EVEN;
-    projection(mesh, chart, on_disk.min(STEEP)).filter(is_even).or_else(unrolled).filter(is_even)
+    if let Some(projected) = projection(mesh, chart, on_disk.min(STEEP)).filter(is_even) {
+        return Ok(Some(projected));
+    }
+    if on_disk <= UNEVEN || chart.triangles().len() > UNROLLED {
+        return Ok(None);
+    }
+    let unrolled = match conformal(chart, monitor) {
+        Ok(unrolled) => unrolled,
+        Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted),
+        // There is the map on the disk.
+        Err(sparse::Error::Unsolvable(_)) => None,
+    };
+    Ok(unrolled.filter(|n| n.distortion.conformal_p99 < on_disk && is_even(n)))
 }
 
 /// The map with the nodes of a chart at `places` (its vertices, then the middles of its edges), scaled to fit and
