@@ -72,7 +72,7 @@ impl Example {
 
     fn least_det(&self, map: &[GridPoint], vertices: [u32; 3]) -> f64 {
         let nodes = self.chart.nodes(self.face(vertices)).map(|n| map[n]);
-        bernstein::range(bernstein::ExactDet::new(nodes).coefficients()).0
+        bernstein::range(bernstein::ExactDet::new(nodes).coefficients()).min
     }
 
     fn quadratic(&self, mids: Mids) -> QuadraticMap {

@@ -25,7 +25,45 @@ pub enum Validity {
     Invalid,
 }
 
+/// A lower bound of a determinant, and what it took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LowerBound {
+    /// The bound, rounded down; on the reference triangle of area 1/2.
+    pub value: f64,
+    /// How often triangles were subdivided.
+    pub depth: u32,
+}
+
+/// The least and the largest value of a polynomial over a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The least value.
+    pub min: f64,
+    /// The largest value.
+    pub max: f64,
+}
+
 /// The Bernstein coefficients of a jacobian determinant, doubled, in grid units squared (2^-106): exact.
+///
+/// # Example
+///
+/// The middle of an edge may move along it, up to a quarter of the way to a vertex: there the triangle folds.
+///
+/// ```
+/// use planish_core::fem::bernstein::{ExactDet, Validity};
+/// use planish_core::grid::GridPoint;
+///
+/// let [a, b, c] = [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]].map(GridPoint::vertex);
+/// let with_middle = |x: f64| {
+///     ExactDet::new([a, b, c, GridPoint::mid([x, 0.0]), b.midpoint(c), c.midpoint(a)])
+/// };
+/// assert_eq!(with_middle(0.25).validity(), Validity::ByBounds);
+/// assert_eq!(with_middle(0.37).validity(), Validity::ByBounds);
+/// assert_eq!(with_middle(0.375).validity(), Validity::Invalid);
+/// // A straight triangle has twice its area everywhere.
+/// assert_eq!(with_middle(0.25).coefficients(), [0.25; 6]);
+/// assert!(with_middle(0.25).lower_bound().value <= 0.25);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ExactDet {
     /// At the corners: 2 M_00, 2 M_11, 2 M_22.
@@ -77,20 +115,21 @@ impl ExactDet {
         det > zero || !(0..3).all(|k| diagonal(k) > zero && mixed(k) > zero)
     }
 
-    /// A lower bound of the determinant over the triangle (on the reference triangle of area 1/2), rounded down,
-    /// and the depth of subdivision it took. Subdivides while a coefficient is not positive, to a fixed depth.
-    pub fn lower_bound(&self) -> (f64, u32) {
+    /// A lower bound of the determinant over the triangle. Subdivides while a coefficient is not positive, to a fixed
+    /// depth.
+    pub fn lower_bound(&self) -> LowerBound {
         let mut pieces = vec![*self];
-        let mut least: Option<f64> = None;
+        let mut value = f64::INFINITY;
         let mut depth = 0;
         loop {
             let scale = (4.0_f64).powi(-(depth as i32)) / (2.0 * UNITS * UNITS);
             let last = depth == DEPTH;
             let (done, open): (Vec<_>, Vec<_>) = pieces.into_iter().partition(|p| last || p.least() > 0);
-            let bounds = done.iter().map(|p| (p.least() as f64).next_down() * scale);
-            least = bounds.chain(least).reduce(f64::min);
+            for piece in &done {
+                value = value.min((piece.least() as f64).next_down() * scale);
+            }
             if open.is_empty() {
-                return (least.unwrap_or(0.0), depth);
+                return LowerBound { value, depth };
             }
             pieces = open.iter().flat_map(Self::quarters).collect();
             depth += 1;
@@ -131,8 +170,8 @@ fn twice(v: GridVector) -> GridVector {
 
 /// The least and the largest value over the triangle of the quadratic polynomial with these Bernstein
 /// coefficients (M_00, M_11, M_22, M_01, M_12, M_20), up to rounding.
-pub fn range(c: [f64; 6]) -> (f64, f64) {
-    (least(c), -least(c.map(|v| -v)))
+pub fn range(c: [f64; 6]) -> Range {
+    Range { min: least(c), max: -least(c.map(|v| -v)) }
 }
 
 fn least(c: [f64; 6]) -> f64 {
@@ -212,8 +251,8 @@ mod tests {
     proptest! {
         #[test]
         fn bounds_enclose_the_range(det in coefficients(1 << 110)) {
-            let (low, depth) = det.lower_bound();
-            let (least, largest) = range(det.coefficients());
+            let LowerBound { value: low, depth } = det.lower_bound();
+            let Range { min: least, max: largest } = range(det.coefficients());
             let size = det.coefficients().iter().fold(0.0_f64, |m, c| m.max(c.abs()));
             prop_assert!(low <= least + 1e-12 * size && depth <= DEPTH);
             let plain = det.least() as f64 / (2.0 * UNITS * UNITS);
@@ -240,7 +279,7 @@ mod tests {
     fn a_straight_triangle_has_twice_its_area_everywhere() {
         let det = ExactDet::new(straight([[0.0, 0.0], [0.5, 0.0], [0.0, 0.25]]));
         assert_eq!(det.coefficients(), [0.125; 6]);
-        assert_eq!(range(det.coefficients()), (0.125, 0.125));
+        assert_eq!(range(det.coefficients()), Range { min: 0.125, max: 0.125 });
         assert_eq!(det.validity(), Validity::ByBounds);
         let flat = ExactDet::new(straight([[0.0, 0.0], [0.5, 0.5], [0.25, 0.25]]));
         assert_eq!(flat.validity(), Validity::Invalid);

@@ -301,10 +301,12 @@ pub fn lower_ears(chart: &ClosedChart, linear: &LinearMap, boundary: &mut Bounda
     const MARGIN: f64 = 0.01;
     let mut nodes = linear.raised(chart, boundary);
     // The edges of one triangle are lowered together, so that no order of them decides.
-    let mut edges: Vec<(usize, usize)> = chart.outer().iter().map(|h| h.face().index()).zip(0..).collect();
-    edges.sort_unstable();
-    for ear in edges.chunk_by(|a, b| a.0 == b.0) {
-        let face = ear[0].0;
+    let outer = chart.outer();
+    let face_of = |edge: usize| outer[edge].face().index();
+    let mut edges: Vec<usize> = (0..outer.len()).collect();
+    edges.sort_by_key(|edge| face_of(*edge));
+    for ear in edges.chunk_by(|a, b| face_of(*a) == face_of(*b)) {
+        let face = face_of(ear[0]);
         let [p, q, r] = chart.triangles()[face].map(|v| linear.places[v.index()]);
         let straight = 2.0 * orientation(p, q, r) as f64;
         for all_the_way in [false, true] {
@@ -313,9 +315,9 @@ pub fn lower_ears(chart: &ClosedChart, linear: &LinearMap, boundary: &mut Bounda
             if least > MARGIN * straight {
                 break;
             }
-            for (_, i) in ear {
-                boundary.lower(*i, all_the_way);
-                nodes[chart.mid_node(chart.outer()[*i])] = boundary.mids()[*i];
+            for edge in ear {
+                boundary.lower(*edge, all_the_way);
+                nodes[chart.mid_node(outer[*edge])] = boundary.mids()[*edge];
             }
         }
     }

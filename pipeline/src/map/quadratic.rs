@@ -111,7 +111,7 @@ pub(crate) fn invalid_triangles(chart: &ClosedChart, nodes: &[GridPoint]) -> Vec
 pub fn least_det(chart: &ClosedChart, map: &QuadraticMap) -> f64 {
     let relative = |f: usize| {
         let dets = Corners::new(&chart.nodes(f).map(|n| map.places[n])).dets();
-        bernstein::range(dets).0 / (2.0 * chart.shapes()[f].area())
+        bernstein::range(dets).min / (2.0 * chart.shapes()[f].area())
     };
     (0..chart.own_triangles()).map(relative).fold(f64::INFINITY, f64::min)
 }

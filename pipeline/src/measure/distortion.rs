@@ -43,7 +43,7 @@ pub fn fields(chart: &Chart, map: &CertifiedMap) -> Vec<CellFields> {
 fn cell_fields(chart: &Chart, map: &CertifiedMap, face: usize) -> CellFields {
     let nodes = map.map().cells[face].map(|n| map.map().nodes[n as usize]);
     let coefficients = ExactDet::new(nodes).coefficients();
-    let (least, largest) = bernstein::range(coefficients);
+    let bernstein::Range { min: least, max: largest } = bernstein::range(coefficients);
     let doubled_area = 2.0 * chart.area(face);
     let (det_min, det_max) = (finite(least / doubled_area), finite(largest / doubled_area));
     CellFields {

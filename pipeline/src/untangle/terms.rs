@@ -4,17 +4,33 @@ use super::objective::SCALARS;
 use crate::fem::jacobian::{AT_CORNERS, PAIRS, cross};
 use crate::mesh::TriangleShape;
 
-/// Adds the square `weight` |sum over n of (r_n + i s_n) w_n|^2 of a complex-linear form in the nodal values
-/// w = u + i v, as a matrix over (u0, v0, u1, ...). Only the lower triangle counts.
-fn add_square(hessian: &mut [[f64; SCALARS]; SCALARS], weight: f64, r: &[f64; 6], s: &[f64; 6]) {
-    for m in 0..6 {
-        for n in 0..=m {
-            let re = weight * (r[m] * r[n] + s[m] * s[n]);
-            let im = weight * (r[m] * s[n] - s[m] * r[n]);
-            hessian[2 * m][2 * n] += re;
-            hessian[2 * m + 1][2 * n + 1] += re;
-            hessian[2 * m][2 * n + 1] -= im;
-            hessian[2 * m + 1][2 * n] += im;
+/// A complex-linear form in the six nodal values w = u + i v, sum over n of (re_n + i im_n) w_n.
+#[derive(Clone, Copy)]
+struct ComplexForm {
+    re: [f64; 6],
+    im: [f64; 6],
+}
+
+impl ComplexForm {
+    /// `self` + `sign` `other`.
+    fn plus(&self, sign: f64, other: &Self) -> Self {
+        let combine = |a: &[f64; 6], b: &[f64; 6]| std::array::from_fn(|n| a[n] + sign * b[n]);
+        Self { re: combine(&self.re, &other.re), im: combine(&self.im, &other.im) }
+    }
+
+    /// Adds `weight` times the square of its absolute value, as a matrix over (u0, v0, u1, ...). Only the lower
+    /// triangle counts.
+    fn add_square(&self, weight: f64, hessian: &mut [[f64; SCALARS]; SCALARS]) {
+        let (r, s) = (&self.re, &self.im);
+        for m in 0..6 {
+            for n in 0..=m {
+                let re = weight * (r[m] * r[n] + s[m] * s[n]);
+                let im = weight * (r[m] * s[n] - s[m] * r[n]);
+                hessian[2 * m][2 * n] += re;
+                hessian[2 * m + 1][2 * n + 1] += re;
+                hessian[2 * m][2 * n + 1] -= im;
+                hessian[2 * m + 1][2 * n] += im;
+            }
         }
     }
 }
@@ -27,37 +43,41 @@ fn add_square(hessian: &mut [[f64; SCALARS]; SCALARS], weight: f64, r: &[f64; 6]
 /// squares and downwards along the positive ones; the former are kept, exactly, the latter dropped. So the
 /// matrix stays positive, whatever the rounding, and no eigenvalues are needed.
 pub(super) fn add_curvature(hessian: &mut [[f64; SCALARS]; SCALARS], shape: &TriangleShape, push: &[f64; 6]) {
-    let (p, n) = complex_derivatives(shape);
+    let Wirtinger { z: p, conj_z: n } = Wirtinger::at_corners(shape);
     for (k, (i, j)) in PAIRS.into_iter().enumerate() {
         if i == j {
-            add_square(hessian, 2.0 * push[k], &n[i].0, &n[i].1);
-            continue;
+            n[i].add_square(2.0 * push[k], hessian);
+        } else {
+            // Re(P_i conj P_j) = |P_i + P_j|^2 / 4 - |P_i - P_j|^2 / 4, and so for N.
+            p[i].plus(-1.0, &p[j]).add_square(0.5 * push[k], hessian);
+            n[i].plus(1.0, &n[j]).add_square(0.5 * push[k], hessian);
         }
-        let combine = |a: &[f64; 6], b: &[f64; 6], sign: f64| std::array::from_fn(|m| a[m] + sign * b[m]);
-        add_square(hessian, 0.5 * push[k], &combine(&p[i].0, &p[j].0, -1.0), &combine(&p[i].1, &p[j].1, -1.0));
-        add_square(hessian, 0.5 * push[k], &combine(&n[i].0, &n[j].0, 1.0), &combine(&n[i].1, &n[j].1, 1.0));
     }
 }
 
-/// Real and imaginary parts of the coefficients of a complex-linear form in the nodal values.
-type Coefficients = ([f64; 6], [f64; 6]);
+/// The complex derivatives of a map at the corners of a triangle, times sqrt(2 area): df/dz and df/d conj z.
+struct Wirtinger {
+    z: [ComplexForm; 3],
+    conj_z: [ComplexForm; 3],
+}
 
-/// The complex derivatives (df/dz and df/d conj z) at the corners, times sqrt(2 area).
-fn complex_derivatives(shape: &TriangleShape) -> ([Coefficients; 3], [Coefficients; 3]) {
-    let p = shape.in_plane();
-    let (length, x, y) = (p[1][0], p[2][0], p[2][1]);
-    let half = 0.5 * (length * y).sqrt();
-    let at = |k: usize| -> [[f64; 2]; 6] {
-        AT_CORNERS[k].map(|[xi, eta]| {
-            let first = xi / length;
-            [half * first, half * (eta - x * first) / y]
-        })
-    };
-    let split = |k: usize, sign: f64| {
-        let g = at(k);
-        (g.map(|g| g[0]), g.map(|g| sign * g[1]))
-    };
-    ([0, 1, 2].map(|k| split(k, -1.0)), [0, 1, 2].map(|k| split(k, 1.0)))
+impl Wirtinger {
+    fn at_corners(shape: &TriangleShape) -> Self {
+        let [_, [length, _], [x, y]] = shape.in_plane();
+        let half = 0.5 * (length * y).sqrt();
+        // The gradients of the basis in the plane of the triangle.
+        let gradients = |corner: usize| -> [[f64; 2]; 6] {
+            AT_CORNERS[corner].map(|[xi, eta]| {
+                let first = xi / length;
+                [half * first, half * (eta - x * first) / y]
+            })
+        };
+        let form = |corner: usize, sign: f64| {
+            let g = gradients(corner);
+            ComplexForm { re: g.map(|g| g[0]), im: g.map(|g| sign * g[1]) }
+        };
+        Self { z: [0, 1, 2].map(|k| form(k, -1.0)), conj_z: [0, 1, 2].map(|k| form(k, 1.0)) }
+    }
 }
 
 /// The three products of an arc of a hole's loop about a centre, with the sign that makes them positive on a

@@ -108,9 +108,9 @@ fn summary(chart: &Chart, map: &PlanarMap) -> Summary {
         let flat = [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
         let area = 0.25 * shape.area();
         for (from, to) in parts(flat).into_iter().zip(parts(uv)) {
-            let (stretch, scale) = stretch(from, to);
-            conformal.push((stretch, area));
-            scales.push((scale, area));
+            let stretch = Stretch::between(from, to);
+            conformal.push((stretch.conformal, area));
+            scales.push((stretch.area, area));
         }
     }
     let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
@@ -118,18 +118,26 @@ fn summary(chart: &Chart, map: &PlanarMap) -> Summary {
     Summary { conformal_median, conformal_p99, area_ratio: (most / least).clamp(1.0, f64::MAX) }
 }
 
-/// The ratio of the singular values of the linear map from one triangle of the plane to another, and that of their
-/// areas.
-fn stretch(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> (f64, f64) {
-    let sides = |t: [[f64; 2]; 3]| [1, 2].map(|i| [t[i][0] - t[0][0], t[i][1] - t[0][1]]);
-    let ([p, q], [u, v]) = (sides(from), sides(to));
-    let doubled = p[0] * q[1] - p[1] * q[0];
-    // The columns of the matrix.
-    let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled);
-    let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled);
-    let det = x[0] * y[1] - x[1] * y[0];
-    let bounded = |x: f64| if x.is_finite() && x > 0.0 { x } else { f64::MAX };
-    (bounded(singular_ratio(x, y, det)).max(1.0), bounded(det))
+/// How the linear map from one triangle of the plane to another stretches.
+struct Stretch {
+    /// The ratio of its singular values, at least 1.
+    conformal: f64,
+    /// The ratio of areas.
+    area: f64,
+}
+
+impl Stretch {
+    fn between(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> Self {
+        let sides = |t: [[f64; 2]; 3]| [1, 2].map(|i| [t[i][0] - t[0][0], t[i][1] - t[0][1]]);
+        let ([p, q], [u, v]) = (sides(from), sides(to));
+        let doubled = p[0] * q[1] - p[1] * q[0];
+        // The columns of the matrix.
+        let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled);
+        let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled);
+        let det = x[0] * y[1] - x[1] * y[0];
+        let bounded = |x: f64| if x.is_finite() && x > 0.0 { x } else { f64::MAX };
+        Self { conformal: bounded(singular_ratio(x, y, det)).max(1.0), area: bounded(det) }
+    }
 }
 
 #[cfg(test)]
