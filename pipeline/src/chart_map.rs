@@ -8,9 +8,9 @@ use crate::decompose;
 use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::map::boundary::{Boundary, Mids};
-use crate::map::closed::ClosedChart;
-use crate::map::linear::{self, LinearMap, linear_map, lower_ears};
-use crate::map::quadratic::{QuadraticMap, least_det, quadratic_map};
+use crate::map::filled::FilledChart;
+use crate::map::linear::{self, LinearMap, flatten_ear_arcs, linear_map};
+use crate::map::quadratic::{QuadraticMap, min_det, quadratic_map};
 use crate::measure::distortion;
 use crate::mesh::SurfaceMesh;
 use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
@@ -31,7 +31,7 @@ pub enum Order {
 /// already, so that there is always something to publish.
 #[derive(Clone, Debug)]
 pub struct MappedChart {
-    closed: ClosedChart,
+    closed: FilledChart,
     linear: LinearMap,
     start: Vec<GridPoint>,
     certified_start: CertifiedMap,
@@ -136,14 +136,14 @@ pub fn map_within(
 ) -> Result<MappedChart, MapError> {
     let checkpoint = Checkpoint::new(monitor);
     let size = chart.triangles().len();
-    let closed = ClosedChart::new(chart);
+    let closed = FilledChart::new(chart);
     checkpoint.after(size)?;
     let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
     let mut boundary = Boundary::circle(&closed, mids);
     let linear = linear_map(&closed, &boundary, monitor)?;
     checkpoint.end()?;
-    lower_ears(&closed, &linear, &mut boundary);
-    let start = linear.raised(&closed, &boundary);
+    flatten_ear_arcs(&closed, &linear, &mut boundary);
+    let start = linear.degree_elevated(&closed, &boundary);
     let centres = (0..closed.loops().len()).map(|k| start[closed.centre_node(k)]).collect();
     let certified_start = prove(planar(&closed, &start, centres)).map_err(MapError::Start)?;
     checkpoint.after(size)?;
@@ -262,9 +262,9 @@ fn finish(mapped: MappedChart, monitor: &dyn Monitor) -> Result<CertifiedChart, 
         Some(Err(unsolved)) => return Ok(of_start(certified_start, linear, Some(unsolved))),
         Some(Ok(map)) => map,
     };
-    let mut invalid = vec![false; closed.own_triangles()];
+    let mut invalid = vec![false; closed.chart_triangles()];
     map.invalid().iter().for_each(|f| invalid[f.index()] = true);
-    let found = Harmonic { invalid, det_min: least_det(&closed, &map) };
+    let found = Harmonic { invalid, det_min: min_det(&closed, &map) };
     let energy = Dirichlet::new(closed.shapes());
     let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &energy, &start, &map, monitor)?;
     let certified = match prove(planar(&closed, &nodes, hole_centres)) {
@@ -325,9 +325,9 @@ fn split_if_stretched(
 }
 
 /// The part of a map that is published: the chart without its fans.
-fn planar(closed: &ClosedChart, nodes: &[GridPoint], hole_centres: Vec<GridPoint>) -> PlanarMap {
-    let cells = (0..closed.own_triangles()).map(|f| closed.nodes(f).map(|n| n as u32)).collect();
-    PlanarMap { cells, nodes: nodes[..closed.own_nodes()].to_vec(), hole_centres }
+fn planar(closed: &FilledChart, nodes: &[GridPoint], hole_centres: Vec<GridPoint>) -> PlanarMap {
+    let cells = (0..closed.chart_triangles()).map(|f| closed.nodes(f).map(|n| n as u32)).collect();
+    PlanarMap { cells, nodes: nodes[..closed.chart_nodes()].to_vec(), hole_centres }
 }
 
 #[cfg(test)]

@@ -108,7 +108,7 @@ mod tests {
     use crate::certify::PlanarMap;
     use crate::fem::sparse::{self, Pattern, solve_general};
     use crate::map::boundary::{Boundary, Mids};
-    use crate::map::closed::ClosedChart;
+    use crate::map::filled::FilledChart;
     use crate::map::linear::mean_value_map;
     use crate::mesh::{SurfaceMesh, TriangleSoup};
     use crate::topology::FaceId;
@@ -157,9 +157,9 @@ mod tests {
         repair(soup, &Default::default()).expect("a surface").mesh
     }
 
-    fn whole(mesh: &SurfaceMesh) -> ClosedChart {
+    fn whole(mesh: &SurfaceMesh) -> FilledChart {
         let labels = vec![0; mesh.triangles().len()];
-        ClosedChart::new(&decompose::assemble(mesh, &labels).expect("one chart").charts()[0])
+        FilledChart::new(&decompose::assemble(mesh, &labels).expect("one chart").charts()[0])
     }
 
     /// Per chart its triangles and its map.

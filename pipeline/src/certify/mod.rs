@@ -23,7 +23,7 @@ pub(crate) mod polygons;
 mod star;
 mod straight;
 
-use crate::fem::bernstein::{ExactDet, Validity};
+use crate::fem::bernstein::{JacobianBezier, Validity};
 use crate::grid::GridPoint;
 use crate::topology::FaceId;
 pub use arcs::Arc;
@@ -168,7 +168,7 @@ pub fn prove(map: PlanarMap) -> Result<CertifiedMap, Error> {
         return Err(Error::OffGrid { node });
     }
     let mut certificate = prove_triangles(&map)?;
-    let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| l.iter().map(|a| arcs::place(a, &map.nodes)).collect()).collect();
+    let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| l.iter().map(|a| arcs::arc_of(a, &map.nodes)).collect()).collect();
     let origin = GridPoint::default();
     let outer: Vec<usize> = (0..arcs.len()).filter(|i| arcs::winds_once(&arcs[*i], origin, 1)).collect();
     let [outer] = outer[..] else { return Err(Error::OuterLoop { count: outer.len(), loops: loops.len() }) };
@@ -205,7 +205,7 @@ fn prove_triangles(map: &PlanarMap) -> Result<Certificate, Error> {
     };
     let mut invalid = Vec::new();
     for (f, cell) in map.cells.iter().enumerate() {
-        let det = ExactDet::new(cell.map(|n| map.nodes[n as usize]));
+        let det = JacobianBezier::new(cell.map(|n| map.nodes[n as usize]));
         match det.validity() {
             Validity::ByBounds => certificate.by_bounds += 1,
             Validity::ByCopositivity => certificate.by_exact += 1,

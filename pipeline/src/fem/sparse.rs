@@ -21,10 +21,10 @@ use faer::{Conj, MatMut, Par, Side};
 pub const PRESCRIBED: u32 = u32::MAX;
 
 /// Factors larger than this (bytes) are not made. A fixed number, so that results do not depend on the machine.
-const LARGEST_FACTOR: usize = 8 << 30;
+const MAX_FACTOR_BYTES: usize = 8 << 30;
 
 /// Factors with no more entries are made in about a millisecond: they are no safe points, as they come by the thousand.
-const SMALL: usize = 50_000;
+const MAX_SMALL_ENTRIES: usize = 50_000;
 
 /// So many times the bytes of a general matrix (12 per entry) are reserved to solve it, as the size of its factors is
 /// not known before. Surfaces of 20 000 to 400 000 triangles took 15 to 42 times as much, the more the larger.
@@ -130,7 +130,7 @@ impl Pattern {
 
     fn analyse_in(&self, order: SymmetricOrdering<u32>) -> Result<Analysis<'_>, Unsolvable> {
         let symbolic = factorize_symbolic_cholesky(self.view(), Side::Lower, order, Default::default());
-        let fits = |s: &SymbolicCholesky<u32>| s.len_val() <= LARGEST_FACTOR / size_of::<f64>();
+        let fits = |s: &SymbolicCholesky<u32>| s.len_val() <= MAX_FACTOR_BYTES / size_of::<f64>();
         let symbolic = symbolic.ok().filter(fits).ok_or(Unsolvable::TooLarge { unknowns: self.unknowns })?;
         Ok(Analysis { pattern: self, symbolic })
     }
@@ -184,7 +184,7 @@ impl Analysis<'_> {
     /// [`Unsolvable::Singular`] when a pivot is not positive, [`Unsolvable::TooLarge`] when memory is short; or
     /// [`Interrupted`].
     pub fn factorise<'a>(&'a self, values: &[f64], monitor: &'a dyn Monitor) -> Result<Factor<'a>, Error> {
-        if self.factor_entries() > SMALL && !monitor.should_continue() {
+        if self.factor_entries() > MAX_SMALL_ENTRIES && !monitor.should_continue() {
             return Err(Interrupted.into());
         }
         let unknowns = self.pattern.unknowns;

@@ -1,13 +1,13 @@
-//! The feasible path: a log-barrier method from the raised linear map.
+//! The feasible path: a log-barrier method from the degree-elevated linear map.
 
 use super::newton::{Limits, minimise};
 use super::objective::Objective;
 use super::penalty::{Bound, Penalty};
 use super::problem::{Cell, Problem};
-use super::{Effort, on_grid, places, region};
+use super::{Stats, on_grid, region, uv_of};
 use crate::fem::sparse::Error;
 use crate::grid::GridPoint;
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use crate::monitor::Checkpoint;
 use crate::topology::FaceId;
 
@@ -25,28 +25,28 @@ const TOLERANCE: f64 = 1e-9;
 const KEPT: f64 = 1e-3;
 
 /// What triangles weigh at least, relative to the mean: where the objective is nothing a barrier is wanted all the same.
-const LIGHTEST: f64 = 1e-6;
+const MIN_WEIGHT: f64 = 1e-6;
 
 /// Descends from `start`.
 ///
 /// # Errors
 /// [`Error`]: the systems are too large or cannot be factorised, or interrupted.
 pub(super) fn untangle<O: Objective>(
-    chart: &ClosedChart,
+    chart: &FilledChart,
     objective: &O,
     start: &[GridPoint],
-    effort: &mut Effort,
+    stats: &mut Stats,
     checkpoint: &Checkpoint,
 ) -> Result<Vec<GridPoint>, Error> {
     checkpoint.after(chart.triangles().len())?;
     let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-    let mut all = places(start, &centres);
+    let mut all = uv_of(start, &centres);
     let weights = weights(chart, objective, &all);
     let mut problem = problem(chart, objective, &weights, checkpoint);
     let mut x = problem.gather(&all);
     problem
         .for_each_bound(&x, |c, bound| *bound = Bound { scale: c, floor: KEPT * c, weight: bound.weight, dual: None });
-    descend(&mut problem, &mut x, effort)?;
+    descend(&mut problem, &mut x, stats)?;
     for moved in problem.moved(&x) {
         all[moved.node] = moved.uv;
     }
@@ -62,16 +62,16 @@ struct Weights {
 }
 
 /// The weights by the objective at `x`.
-fn weights<O: Objective>(chart: &ClosedChart, objective: &O, x: &[[f64; 2]]) -> Weights {
+fn weights<O: Objective>(chart: &FilledChart, objective: &O, x: &[[f64; 2]]) -> Weights {
     let value = |f: usize| objective.value(FaceId::at(f), &chart.nodes(f).map(|n| x[n]));
     let values: Vec<f64> = (0..chart.triangles().len()).map(value).collect();
-    let mean = values.iter().sum::<f64>() / chart.own_triangles() as f64;
-    Weights { of_faces: values.into_iter().map(|v| v.max(LIGHTEST * mean)).collect(), mean }
+    let mean = values.iter().sum::<f64>() / chart.chart_triangles() as f64;
+    Weights { of_faces: values.into_iter().map(|v| v.max(MIN_WEIGHT * mean)).collect(), mean }
 }
 
 /// All triangles, with their weights but bounds still unset; every node may move but those of the outer loop.
 fn problem<'a, O: Objective>(
-    chart: &'a ClosedChart,
+    chart: &'a FilledChart,
     objective: &'a O,
     weights: &Weights,
     checkpoint: &'a Checkpoint,
@@ -79,7 +79,7 @@ fn problem<'a, O: Objective>(
     let unset = |weight: f64| Bound { scale: 1.0, floor: 0.0, weight, dual: None };
     let cell = |f: usize| Cell {
         face: FaceId::at(f),
-        bounds: (f < chart.own_triangles()).then(|| [unset(weights.of_faces[f]); 6]),
+        bounds: (f < chart.chart_triangles()).then(|| [unset(weights.of_faces[f]); 6]),
     };
     let cells = (0..chart.triangles().len()).map(cell).collect();
     let is_outer = chart.outer_nodes();
@@ -90,7 +90,7 @@ fn problem<'a, O: Objective>(
 }
 
 /// Minimises with falling weights.
-fn descend<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], effort: &mut Effort) -> Result<(), Error> {
+fn descend<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &mut Stats) -> Result<(), Error> {
     if problem.unknowns() == 0 {
         return Ok(());
     }
@@ -103,7 +103,7 @@ fn descend<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], effort: &
     for weight in WEIGHTS {
         problem.scale_weights(weight / last);
         last = weight;
-        effort.add(minimise(problem, &analysis, x, Penalty::Barrier, limits)?);
+        stats.add(minimise(problem, &analysis, x, Penalty::Barrier, limits)?);
     }
     Ok(())
 }

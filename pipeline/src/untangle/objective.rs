@@ -1,7 +1,7 @@
 //! What untangling minimises.
 
 use crate::fem::element::{self, Element, P2};
-use crate::fem::jacobian::Six;
+use crate::fem::jacobian::P2Nodes;
 use crate::mesh::TriangleShape;
 use crate::topology::FaceId;
 
@@ -17,15 +17,15 @@ pub struct LocalModel {
     pub hessian: [[f64; SCALARS]; SCALARS],
 }
 
-/// An objective: a sum over the triangles of a chart, each summand a smooth function, never negative, of the places of
+/// An objective: a sum over the triangles of a chart, each summand a smooth function, never negative, of the uv_of of
 /// the triangle's six nodes. Newton's method and the barrier know nothing else of it.
 pub trait Objective {
     /// The summand of a triangle whose nodes lie at `x`.
-    fn value(&self, face: FaceId, x: &Six) -> f64;
+    fn value(&self, face: FaceId, x: &P2Nodes) -> f64;
 
     /// Gradient and curvature of that summand. The matrix in place of the Hessian must be positive semidefinite: where
     /// the summand is not convex, what makes it so is left out.
-    fn model(&self, face: FaceId, x: &Six) -> LocalModel;
+    fn model(&self, face: FaceId, x: &P2Nodes) -> LocalModel;
 
     /// The order of magnitude of the summand of a triangle that covers `area` in the plane: the unit in which penalties
     /// are weighed against the objective.
@@ -50,11 +50,11 @@ impl<'a> Dirichlet<'a> {
 }
 
 impl Objective for Dirichlet<'_> {
-    fn value(&self, face: FaceId, x: &Six) -> f64 {
+    fn value(&self, face: FaceId, x: &P2Nodes) -> f64 {
         element::energy(&self.stiffness(face), x)
     }
 
-    fn model(&self, face: FaceId, x: &Six) -> LocalModel {
+    fn model(&self, face: FaceId, x: &P2Nodes) -> LocalModel {
         let stiffness = self.stiffness(face);
         // Differences to the first node, so that small triangles lose no digits.
         let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);

@@ -9,11 +9,11 @@ use super::objective::Objective;
 use super::penalty::{Bound, Penalty};
 use super::problem::{Cell, Moved, Problem};
 use super::region;
-use super::{Effort, arc, centre_of_hole, places, terms};
-use crate::fem::bernstein::{ExactDet, Validity};
+use super::{Stats, arc, centre_of_hole, terms, uv_of};
+use crate::fem::bernstein::{JacobianBezier, Validity};
 use crate::fem::sparse;
 use crate::grid::GridPoint;
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use crate::map::quadratic::{QuadraticMap, det, invalid_triangles, node_to_grid};
 use crate::monitor::{Checkpoint, Interrupted};
 use crate::topology::{FaceId, HalfEdgeId, Stars, VertexId};
@@ -22,13 +22,13 @@ use crate::topology::{FaceId, HalfEdgeId, Stars, VertexId};
 const RINGS: [usize; 5] = [2, 4, 7, 12, 20];
 
 /// Patches with more triangles than this share of the chart are left to the feasible path.
-const LARGEST: f64 = 0.5;
+const MAX_SHARE: f64 = 0.5;
 
 /// Weight of the regularised penalty, relative to the area of each triangle in the plane.
 const PULL: f64 = 3e-2;
 
 /// The least width of the regularised penalty, relative to a typical jacobian.
-const NARROWEST: f64 = 1e-4;
+const MIN_WIDTH: f64 = 1e-4;
 
 /// Changes of the regularised penalty's width, and Newton steps for each.
 const ROUNDS: usize = 25;
@@ -75,16 +75,16 @@ impl From<sparse::Error> for Stuck {
 /// # Errors
 /// [`Stuck`].
 pub(super) fn untangle<O: Objective>(
-    chart: &ClosedChart,
+    chart: &FilledChart,
     objective: &O,
     start: &[GridPoint],
     harmonic: &QuadraticMap,
-    effort: &mut Effort,
+    stats: &mut Stats,
     checkpoint: &Checkpoint,
 ) -> Result<Vec<GridPoint>, Stuck> {
-    let setting = Setting::new(chart, objective, start, checkpoint);
+    let context = PatchContext::new(chart, objective, start, checkpoint);
     let mut nodes = harmonic.nodes().to_vec();
-    let mut x = harmonic.places().to_vec();
+    let mut x = harmonic.uv().to_vec();
     for rings in RINGS {
         checkpoint.after(chart.triangles().len())?;
         let centres: Vec<_> = (0..chart.loops().len()).map(|k| centre_of_hole(chart, &nodes, k)).collect();
@@ -95,14 +95,14 @@ pub(super) fn untangle<O: Objective>(
         let fallback = |k: usize| centres[k].unwrap_or(nodes[chart.centre_node(k)]);
         x.truncate(chart.node_count());
         x.extend((0..centres.len()).map(|k| fallback(k).uv()));
-        let patches = region::patches(chart, &setting.stars, &seeds, rings);
-        if patches.parts.iter().any(|p| p.len() as f64 > LARGEST * chart.own_triangles() as f64) {
+        let patches = region::patches(chart, &context.stars, &seeds, rings);
+        if patches.parts.iter().any(|p| p.len() as f64 > MAX_SHARE * chart.chart_triangles() as f64) {
             return Err(Stuck::TooLarge);
         }
         for faces in &patches.parts {
             checkpoint.after(faces.len())?;
             let weight = |v: usize| 1.5 * (1.0 - f64::from(patches.distance[v]) / rings as f64);
-            match setting.solve(faces, &x, weight, effort) {
+            match context.solve(faces, &x, weight, stats) {
                 Ok(moved) => moved.into_iter().for_each(|Moved { node, uv }| {
                     x[node] = uv;
                     nodes[node] = node_to_grid(chart, node, uv);
@@ -118,7 +118,7 @@ pub(super) fn untangle<O: Objective>(
 }
 
 /// The triangles that must change: invalid ones, and those at arcs of holes that no point can see.
-fn seeds(chart: &ClosedChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]) -> Vec<u32> {
+fn seeds(chart: &FilledChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]) -> Vec<u32> {
     let mut seeds: Vec<u32> = invalid_triangles(chart, nodes).iter().map(|f| f.0).collect();
     for (k, hole) in chart.loops().iter().enumerate().filter(|(k, _)| centres[*k].is_none()) {
         let hidden =
@@ -131,21 +131,21 @@ fn seeds(chart: &ClosedChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]
 }
 
 /// What all patches of a chart share.
-struct Setting<'a, O> {
-    chart: &'a ClosedChart,
+struct PatchContext<'a, O> {
+    chart: &'a FilledChart,
     objective: &'a O,
     stars: Stars,
     /// Per triangle, a typical jacobian: its area in space times the area scale of the linear map around it.
     density: Vec<f64>,
-    /// The raised linear map.
+    /// The degree-elevated linear map.
     start: Vec<[f64; 2]>,
     /// Per node, whether it lies on the outer loop.
     fixed: Vec<bool>,
     checkpoint: &'a Checkpoint<'a>,
 }
 
-impl<'a, O: Objective> Setting<'a, O> {
-    fn new(chart: &'a ClosedChart, objective: &'a O, start: &[GridPoint], checkpoint: &'a Checkpoint) -> Self {
+impl<'a, O: Objective> PatchContext<'a, O> {
+    fn new(chart: &'a FilledChart, objective: &'a O, start: &[GridPoint], checkpoint: &'a Checkpoint) -> Self {
         let stars = Stars::new(chart.triangles(), chart.vertex_count());
         let in_plane = |f: usize| det(chart, start, f).coefficients().iter().sum::<f64>() / 6.0;
         let plane: Vec<f64> = (0..chart.triangles().len()).map(in_plane).collect();
@@ -157,7 +157,7 @@ impl<'a, O: Objective> Setting<'a, O> {
         };
         let density = (0..plane.len()).map(density).collect();
         let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-        let (start, fixed) = (places(start, &centres), chart.outer_nodes());
+        let (start, fixed) = (uv_of(start, &centres), chart.outer_nodes());
         Self { chart, objective, stars, density, start, fixed, checkpoint }
     }
 
@@ -168,7 +168,7 @@ impl<'a, O: Objective> Setting<'a, O> {
         faces: &[u32],
         x: &[[f64; 2]],
         weight: impl Fn(usize) -> f64,
-        effort: &mut Effort,
+        stats: &mut Stats,
     ) -> Result<Vec<Moved>, Stuck> {
         let mut problem = self.problem(faces);
         if problem.unknowns() == 0 {
@@ -176,26 +176,26 @@ impl<'a, O: Objective> Setting<'a, O> {
         }
         let mut local = problem.gather(x);
         self.blend(&mut local, &problem, faces, weight);
-        let mut spent = Effort::default();
+        let mut spent = Stats::default();
         let relaxed = relax(&mut problem, &mut local, &mut spent);
-        effort.iterations += spent.iterations;
+        stats.iterations += spent.iterations;
         relaxed?;
         let mut moved: Vec<Moved> = problem.moved(&local).collect();
         moved.sort_unstable_by_key(|m| m.node);
         let place = |n: usize| moved.binary_search_by_key(&n, |m| m.node).map_or(x[n], |i| moved[i].uv);
         let cell = |f: &u32| self.chart.nodes(*f as usize).map(|n| node_to_grid(self.chart, n, place(n)));
-        let mut own = faces.iter().filter(|f| (**f as usize) < self.chart.own_triangles());
-        if !own.all(|f| ExactDet::new(cell(f)).validity() != Validity::Invalid) {
+        let mut own = faces.iter().filter(|f| (**f as usize) < self.chart.chart_triangles());
+        if !own.all(|f| JacobianBezier::new(cell(f)).validity() != Validity::Invalid) {
             return Err(Stuck::Invalid);
         }
-        effort.decrement = effort.decrement.max(spent.decrement);
+        stats.decrement = stats.decrement.max(spent.decrement);
         Ok(moved)
     }
 
     /// Moves free nodes towards the feasible start, by a share that `weight` gives for each vertex (cut to 0 and 1)
     /// and that mid-edge nodes take from both ends.
     fn blend(&self, x: &mut [[f64; 2]], problem: &Problem<O>, faces: &[u32], weight: impl Fn(usize) -> f64) {
-        let own = self.chart.own_vertices();
+        let own = self.chart.chart_vertices();
         let share = |v: VertexId| if v.index() < own { weight(v.index()).clamp(0.0, 1.0) } else { 0.0 };
         let mut shares: Vec<(usize, f64)> = Vec::with_capacity(6 * faces.len());
         for f in faces {
@@ -216,7 +216,7 @@ impl<'a, O: Objective> Setting<'a, O> {
 
     /// The problem on a patch: penalties on its triangles and on the arcs of holes in it.
     fn problem(&self, faces: &[u32]) -> Problem<'a, O> {
-        let own = |f: u32| (f as usize) < self.chart.own_triangles();
+        let own = |f: u32| (f as usize) < self.chart.chart_triangles();
         let bound = |f: u32| {
             let density = self.density[f as usize];
             Bound { scale: density, floor: 0.0, weight: self.objective.typical(density), dual: None }
@@ -236,12 +236,12 @@ impl<'a, O: Objective> Setting<'a, O> {
 }
 
 /// Pulls a patch over to the valid side, then lets it relax towards the harmonic map.
-fn relax<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], effort: &mut Effort) -> Result<(), Stuck> {
+fn relax<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &mut Stats) -> Result<(), Stuck> {
     let pattern = problem.pattern();
     problem.checkpoint()?;
     let analysis = pattern.analyse()?;
     problem.scale_weights(PULL);
-    let mut least = problem.least(x);
+    let mut least = problem.min_ratio(x);
     let mut eps = f64::INFINITY;
     let limits = Limits { steps: STEPS_PER_ROUND, tolerance: TOLERANCE };
     for _ in 0..ROUNDS {
@@ -250,9 +250,9 @@ fn relax<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], effort: &mu
         }
         // Never wider than the worst jacobian asks for, and narrower from round to round: a penalty that is too
         // wide comes to rest against the energy while triangles are still inverted.
-        eps = (0.6 * eps).min(-0.2 * least).max(NARROWEST);
-        effort.add(minimise(problem, &analysis, x, Penalty::Regularised { eps }, limits)?);
-        least = problem.least(x);
+        eps = (0.6 * eps).min(-0.2 * least).max(MIN_WIDTH);
+        stats.add(minimise(problem, &analysis, x, Penalty::Regularised { eps }, limits)?);
+        least = problem.min_ratio(x);
     }
     if least <= 0.0 {
         return Err(Stuck::Invalid);
@@ -264,7 +264,7 @@ fn relax<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], effort: &mu
     for weight in WEIGHTS {
         problem.scale_weights(weight / last);
         last = weight;
-        effort.add(minimise(problem, &analysis, x, Penalty::Barrier, limits)?);
+        stats.add(minimise(problem, &analysis, x, Penalty::Barrier, limits)?);
     }
     Ok(())
 }

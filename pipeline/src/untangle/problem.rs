@@ -2,11 +2,11 @@
 
 use super::objective::{LocalModel, Objective, SCALARS};
 use super::penalty::{Bound, Penalty, Value};
-use super::terms::{self, Four};
+use super::terms::{self, ArcNodes};
 use crate::fem::dofs::Dofs;
-use crate::fem::jacobian::{Corners, Six};
+use crate::fem::jacobian::{CornerDerivatives, P2Nodes};
 use crate::fem::sparse::{Analysis, Error, PRESCRIBED, Pattern, Unsolvable};
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use crate::monitor::{Checkpoint, Interrupted};
 use crate::topology::FaceId;
 
@@ -33,7 +33,7 @@ pub(super) struct ArcCell {
 /// The part of a chart in which nodes may move, the objective, and the penalties that hold there. Its nodes have
 /// numbers of their own, so that a small region costs little, however large the chart is.
 pub(super) struct Problem<'a, O> {
-    chart: &'a ClosedChart,
+    chart: &'a FilledChart,
     objective: &'a O,
     checkpoint: &'a Checkpoint<'a>,
     pub cells: Vec<Cell>,
@@ -63,7 +63,7 @@ impl<'a, O: Objective> Problem<'a, O> {
     /// The problem on `cells` and `arcs`, of whose nodes those in `free` may move; nodes as numbered in the chart,
     /// star centres after all others.
     pub fn new(
-        chart: &'a ClosedChart,
+        chart: &'a FilledChart,
         objective: &'a O,
         cells: Vec<Cell>,
         mut arcs: Vec<ArcCell>,
@@ -91,7 +91,7 @@ impl<'a, O: Objective> Problem<'a, O> {
         &self.nodes
     }
 
-    /// The places of the region's nodes, out of those of the whole chart.
+    /// The uv_of of the region's nodes, out of those of the whole chart.
     pub fn gather(&self, all: &[[f64; 2]]) -> Vec<[f64; 2]> {
         self.nodes.iter().map(|n| all[*n as usize]).collect()
     }
@@ -129,21 +129,21 @@ impl<'a, O: Objective> Problem<'a, O> {
     pub fn value(&self, x: &[[f64; 2]], penalty: Penalty) -> f64 {
         let mut total = 0.0;
         for (i, cell) in self.cells.iter().enumerate() {
-            let six = self.six(i, x);
-            total += self.objective.value(cell.face, &six);
+            let uv = self.cell_uv(i, x);
+            total += self.objective.value(cell.face, &uv);
             if let Some(bounds) = &cell.bounds {
-                let dets = Corners::new(&six).dets();
+                let dets = CornerDerivatives::new(&uv).dets();
                 total += (0..6).map(|k| penalty.at(dets[k], &bounds[k]).value).sum::<f64>();
             }
         }
         for arc in &self.arcs {
-            let products = terms::arc_products(&four(arc, x));
+            let products = terms::arc_products(&arc_uv(arc, x));
             total += (0..3).map(|k| penalty.at(products[k], &arc.bounds[k]).value).sum::<f64>();
         }
         total
     }
 
-    fn six(&self, cell: usize, x: &[[f64; 2]]) -> Six {
+    fn cell_uv(&self, cell: usize, x: &[[f64; 2]]) -> P2Nodes {
         self.of_cell[cell].map(|n| x[n as usize])
     }
 
@@ -151,14 +151,14 @@ impl<'a, O: Objective> Problem<'a, O> {
     pub fn model(&self, x: &[[f64; 2]], penalty: Penalty, pattern: &Pattern) -> Model {
         let mut model = Model { gradient: vec![0.0; self.unknowns()], hessian: pattern.zeros() };
         for (i, cell) in self.cells.iter().enumerate() {
-            let six = self.six(i, x);
-            let mut local = self.objective.model(cell.face, &six);
+            let uv = self.cell_uv(i, x);
+            let mut local = self.objective.model(cell.face, &uv);
             if let Some(bounds) = &cell.bounds {
-                let corners = Corners::new(&six);
+                let corners = CornerDerivatives::new(&uv);
                 let dets = corners.dets();
                 let values: [Value; 6] = std::array::from_fn(|k| penalty.at(dets[k], &bounds[k]));
                 let shape = &self.chart.shapes()[cell.face.index()];
-                terms::add_curvature(&mut local.hessian, shape, &values.map(|v| v.force));
+                terms::add_curvature(&mut local.hessian, shape, &values.map(|v| v.multiplier));
                 for (k, value) in values.iter().enumerate() {
                     add_outer(&mut local, value, &corners.gradient(k));
                 }
@@ -167,12 +167,12 @@ impl<'a, O: Objective> Problem<'a, O> {
             self.scatter(&mut model.gradient, &self.of_cell[i], &local.gradient);
         }
         for (i, arc) in self.arcs.iter().enumerate() {
-            let places = four(arc, x);
-            let products = terms::arc_products(&places);
+            let uv_of = arc_uv(arc, x);
+            let products = terms::arc_products(&uv_of);
             let mut local = LocalModel { gradient: [0.0; SCALARS], hessian: [[0.0; SCALARS]; SCALARS] };
             for k in 0..3 {
                 let value = penalty.at(products[k], &arc.bounds[k]);
-                add_outer(&mut local, &value, &padded(terms::arc_gradient(&places, k)));
+                add_outer(&mut local, &value, &padded(terms::arc_gradient(&uv_of, k)));
             }
             pattern.add(&mut model.hessian, self.cells.len() + i, &local.hessian);
             self.scatter(&mut model.gradient, &arc.nodes, &local.gradient);
@@ -204,13 +204,15 @@ impl<'a, O: Objective> Problem<'a, O> {
         let mut meet = |c0: f64, c1: f64, c2: f64| longest = longest.min(terms::first_zero(c0, c1, c2));
         for (i, cell) in self.cells.iter().enumerate() {
             let Some(bounds) = &cell.bounds else { continue };
-            let (at, along) = (Corners::new(&self.six(i, x)), Corners::new(&self.six(i, direction)));
-            let (c0, c1, c2) = (at.dets(), at.mixed(&along), along.dets());
+            let (at, along) =
+                (CornerDerivatives::new(&self.cell_uv(i, x)), CornerDerivatives::new(&self.cell_uv(i, direction)));
+            let (c0, c1, c2) = (at.dets(), at.polarization(&along), along.dets());
             (0..6).for_each(|k| meet(c0[k] - bounds[k].floor, c1[k], c2[k]));
         }
         for arc in &self.arcs {
-            let (at, along) = (four(arc, x), four(arc, direction));
-            let (c0, c1, c2) = (terms::arc_products(&at), terms::arc_mixed(&at, &along), terms::arc_products(&along));
+            let (at, along) = (arc_uv(arc, x), arc_uv(arc, direction));
+            let (c0, c1, c2) =
+                (terms::arc_products(&at), terms::arc_polarization(&at, &along), terms::arc_products(&along));
             (0..3).for_each(|k| meet(c0[k] - arc.bounds[k].floor, c1[k], c2[k]));
         }
         longest
@@ -219,13 +221,13 @@ impl<'a, O: Objective> Problem<'a, O> {
     /// Calls `visit` with every penalised quantity and its bound.
     pub fn for_each_bound(&mut self, x: &[[f64; 2]], mut visit: impl FnMut(f64, &mut Bound)) {
         for i in 0..self.cells.len() {
-            let dets = Corners::new(&self.six(i, x)).dets();
+            let dets = CornerDerivatives::new(&self.cell_uv(i, x)).dets();
             if let Some(bounds) = &mut self.cells[i].bounds {
                 (0..6).for_each(|k| visit(dets[k], &mut bounds[k]));
             }
         }
         for arc in &mut self.arcs {
-            let products = terms::arc_products(&four(arc, x));
+            let products = terms::arc_products(&arc_uv(arc, x));
             (0..3).for_each(|k| visit(products[k], &mut arc.bounds[k]));
         }
     }
@@ -237,20 +239,20 @@ impl<'a, O: Objective> Problem<'a, O> {
             if self.cells[i].bounds.is_none() {
                 continue;
             }
-            let [x, d, y] = [from, direction, to].map(|p| Corners::new(&self.six(i, p)));
-            let (c, change, new) = (x.dets(), x.mixed(&d), y.dets());
+            let [x, d, y] = [from, direction, to].map(|p| CornerDerivatives::new(&self.cell_uv(i, p)));
+            let (c, change, new) = (x.dets(), x.polarization(&d), y.dets());
             let bounds = self.cells[i].bounds.iter_mut().flatten();
             bounds.enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));
         }
         for arc in &mut self.arcs {
-            let [x, d, y] = [from, direction, to].map(|p| four(arc, p));
-            let (c, change, new) = (terms::arc_products(&x), terms::arc_mixed(&x, &d), terms::arc_products(&y));
+            let [x, d, y] = [from, direction, to].map(|p| arc_uv(arc, p));
+            let (c, change, new) = (terms::arc_products(&x), terms::arc_polarization(&x, &d), terms::arc_products(&y));
             arc.bounds.iter_mut().enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));
         }
     }
 
     /// The least penalised quantity, relative to its scale.
-    pub fn least(&mut self, x: &[[f64; 2]]) -> f64 {
+    pub fn min_ratio(&mut self, x: &[[f64; 2]]) -> f64 {
         let mut least = f64::INFINITY;
         self.for_each_bound(x, |c, bound| least = least.min((c - bound.floor) / bound.scale));
         least
@@ -286,7 +288,7 @@ impl<'a, O: Objective> Problem<'a, O> {
     }
 }
 
-fn four(arc: &ArcCell, x: &[[f64; 2]]) -> Four {
+fn arc_uv(arc: &ArcCell, x: &[[f64; 2]]) -> ArcNodes {
     arc.nodes.map(|n| x[n as usize])
 }
 
@@ -297,9 +299,9 @@ fn padded(g: [f64; 8]) -> [f64; SCALARS] {
 /// Adds slope and curvature of a penalty on a quantity with this gradient.
 fn add_outer(local: &mut LocalModel, value: &Value, gradient: &[f64; SCALARS]) {
     for i in 0..SCALARS {
-        local.gradient[i] -= value.push * gradient[i];
+        local.gradient[i] -= value.neg_derivative * gradient[i];
         for j in 0..=i {
-            local.hessian[i][j] += value.bend * gradient[i] * gradient[j];
+            local.hessian[i][j] += value.second_derivative * gradient[i] * gradient[j];
         }
     }
 }

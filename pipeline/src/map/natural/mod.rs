@@ -77,10 +77,10 @@ pub fn natural(
     Ok(unrolled.filter(|n| n.distortion.conformal_p99 < on_disk && is_even(n)))
 }
 
-/// The map with the nodes of a chart at `places` (its vertices, then the middles of its edges), scaled to fit and
+/// The map with the nodes of a chart at `uv` (its vertices, then the middles of its edges), scaled to fit and
 /// rounded to the grid; none where it is not one-to-one.
-fn certified(chart: &Chart, places: &[[f64; 2]]) -> Option<Natural> {
-    let nodes = fitted(places)?.into_iter().map(GridPoint::mid).collect();
+fn certified(chart: &Chart, uv: &[[f64; 2]]) -> Option<Natural> {
+    let nodes = fitted(uv)?.into_iter().map(GridPoint::mid).collect();
     let map = PlanarMap { cells: chart.cells().collect(), nodes, hole_centres: vec![] };
     let map = prove_straight(map).ok()?;
     let distortion = summary(chart, map.map());
@@ -88,14 +88,14 @@ fn certified(chart: &Chart, places: &[[f64; 2]]) -> Option<Natural> {
 }
 
 /// Places moved and scaled into a disk of [`RADIUS`] around the origin; none where they all are one, or not finite.
-fn fitted(places: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-    let bound = |k: usize, f: fn(f64, f64) -> f64, start| places.iter().map(|p| p[k]).fold(start, f);
-    let least = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
-    let most = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
-    let half = 0.5 * (most[0] - least[0]).hypot(most[1] - least[1]);
+fn fitted(uv: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+    let bound = |k: usize, f: fn(f64, f64) -> f64, start| uv.iter().map(|p| p[k]).fold(start, f);
+    let min = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
+    let max = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
+    let half = 0.5 * (max[0] - min[0]).hypot(max[1] - min[1]);
     let scale = RADIUS / half;
-    let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (least[k] + most[k])) * scale);
-    (scale.is_finite() && scale > 0.0).then(|| places.iter().map(moved).collect())
+    let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (min[k] + max[k])) * scale);
+    (scale.is_finite() && scale > 0.0).then(|| uv.iter().map(moved).collect())
 }
 
 /// How much the parts of a chart's triangles are stretched. The area ratio is that of parts, not of stars.
@@ -114,8 +114,8 @@ fn summary(chart: &Chart, map: &PlanarMap) -> Summary {
         }
     }
     let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
-    let [least, most] = quantiles(&mut scales, [0.001, 0.999]);
-    Summary { conformal_median, conformal_p99, area_ratio: (most / least).clamp(1.0, f64::MAX) }
+    let [min, max] = quantiles(&mut scales, [0.001, 0.999]);
+    Summary { conformal_median, conformal_p99, area_ratio: (max / min).clamp(1.0, f64::MAX) }
 }
 
 /// How the linear map from one triangle of the plane to another stretches.
