@@ -11,7 +11,7 @@ use planish_core::atlas::Atlas;
 use planish_core::fem::sparse;
 use planish_core::map::linear;
 use planish_core::mesh::{SurfaceMesh, TriangleSoup};
-use planish_core::monitor::{Monitor, NoMonitor};
+use planish_core::monitor::{Interrupted, Monitor, NoMonitor};
 use planish_core::repair::{self, Accepted, Repaired, repair};
 use planish_core::{CertifiedAtlas, CertifiedChart, ChartError, ChartJob, MapError, MappedChart, Plan, decompose};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -109,7 +109,7 @@ pub fn untangle(mapped: MappedChart, monitor: &dyn Monitor) -> Result<Vec<Certif
 fn not_mapped(error: ChartError) -> Abort {
     let code = match &error {
         ChartError::Interrupted(_) => return Abort::Unwanted,
-        ChartError::Map(MapError::Linear(linear::Error::Solver(sparse::Error::TooLarge { .. }))) => Code::TooLarge,
+        ChartError::Map(MapError::Linear(linear::Error::Solver(sparse::Unsolvable::TooLarge { .. }))) => Code::TooLarge,
         ChartError::Map(_) => Code::NeedsSplit,
         ChartError::Split(_) => Code::Internal,
     };
@@ -120,13 +120,14 @@ fn not_mapped(error: ChartError) -> Abort {
 /// the files of the result.
 ///
 /// # Errors
-/// Where the result cannot be encoded: a fault of planish.
+/// Where the result cannot be encoded, a fault of planish; or that it is no longer wanted.
 pub fn assemble(
     mesh: SurfaceMesh,
     charts: Vec<CertifiedChart>,
     whole: usize,
     settings: &Settings,
-) -> Result<(CertifiedFacts, Files), Reason> {
+    monitor: &dyn Monitor,
+) -> Result<(CertifiedFacts, Files), Abort> {
     let charts_by_splitting = charts.len() - whole;
     let atlas = CertifiedAtlas::gather(mesh, charts, settings.size).map_err(internal)?;
     atlas.charts().iter().for_each(warn_if_unsolved);
@@ -134,7 +135,7 @@ pub fn assemble(
     let mut hand_off = None;
     if settings.hand_off == settings::ExportTarget::Gmsh {
         let size = settings.size.unwrap_or_else(|| atlas.mesh().default_size());
-        let export = export::gmsh(&atlas, size);
+        let export = export::gmsh(&atlas, size, monitor).map_err(|Interrupted| Abort::Unwanted)?;
         files.extend(export.files);
         hand_off = Some(export.report);
     }
@@ -164,7 +165,7 @@ pub fn finish(input: Input, found: Repaired, atlas: Atlas, settings: &Settings) 
             done.extend(untangle(mapped, &NoMonitor)?);
         }
     }
-    let (certified, files) = assemble(found.mesh, done, whole, settings)?;
+    let (certified, files) = assemble(found.mesh, done, whole, settings, &NoMonitor)?;
     Ok((facts.certified(settings, certified), files))
 }
 

@@ -108,7 +108,7 @@ mod tests {
     use crate::certify::PlanarMap;
     use crate::fem::sparse::{self, Pattern, solve_general};
     use crate::map::boundary::{Boundary, Mids};
-    use crate::map::closed::ClosedChart;
+    use crate::map::filled::FilledChart;
     use crate::map::linear::mean_value_map;
     use crate::mesh::{SurfaceMesh, TriangleSoup};
     use crate::topology::FaceId;
@@ -157,9 +157,9 @@ mod tests {
         repair(soup, &Default::default()).expect("a surface").mesh
     }
 
-    fn whole(mesh: &SurfaceMesh) -> ClosedChart {
+    fn whole(mesh: &SurfaceMesh) -> FilledChart {
         let labels = vec![0; mesh.triangles().len()];
-        ClosedChart::new(&decompose::assemble(mesh, &labels).expect("one chart").charts()[0])
+        FilledChart::new(&decompose::assemble(mesh, &labels).expect("one chart").charts()[0])
     }
 
     /// Per chart its triangles and its map.
@@ -220,7 +220,7 @@ mod tests {
                     assert!(monitor.reserved.load(Relaxed) as usize >= 8 * analysis.factor_entries());
                     drop(factor);
                 }
-                Err(error) => assert_eq!(error, sparse::Error::Singular { unknowns: 2 }),
+                Err(error) => assert_eq!(error, sparse::Unsolvable::Singular { unknowns: 2 }.into()),
             }
             assert!(monitor.most() >= 8 * analysis.factor_entries());
             let broken = catch_unwind(AssertUnwindSafe(|| {

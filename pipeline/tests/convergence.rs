@@ -3,8 +3,8 @@
 use planish_core::fem::element::{self, Element, P1, P2};
 use planish_core::fem::quadrature::Rule;
 use planish_core::map::boundary::Boundary;
-use planish_core::map::closed::ClosedChart;
-use planish_core::map::linear::harmonic_places;
+use planish_core::map::filled::FilledChart;
+use planish_core::map::linear::harmonic_uv;
 use planish_core::map::quadratic::quadratic_map;
 use planish_core::monitor::NoMonitor;
 use planish_core::vec3::{Vec3, midpoint, triangle_area};
@@ -20,13 +20,13 @@ fn exact(p: Vec3) -> [f64; 2] {
 fn errors(rings: u32) -> [f64; 2] {
     let mesh = repair(&shapes::flat_disk(rings), &Default::default()).expect("a surface").mesh;
     let chart =
-        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
+        FilledChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
     let place = |v: planish_core::topology::VertexId| mesh.points()[v.index()];
     let ends = |h: &planish_core::topology::HalfEdgeId| chart.ends(*h).map(place);
     let vertices: Vec<_> = chart.outer().iter().map(|h| exact(ends(h)[0])).collect();
     let mids: Vec<_> = chart.outer().iter().map(|h| exact(midpoint(ends(h)[0], ends(h)[1]))).collect();
     let boundary = Boundary::through(&chart, &vertices, &mids).expect("one per node");
-    let linear = harmonic_places(&chart, &boundary, &NoMonitor).expect("solves");
+    let linear = harmonic_uv(&chart, &boundary, &NoMonitor).expect("solves");
     let quadratic = quadratic_map(&chart, &boundary, &NoMonitor).expect("solves");
     let mut squares = [0.0; 2];
     for (f, t) in chart.triangles().iter().enumerate() {

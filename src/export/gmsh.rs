@@ -7,7 +7,7 @@ use planish_core::evaluate::Plane;
 use planish_core::map::natural::{Natural, natural};
 use planish_core::measure::distortion::Summary;
 use planish_core::measure::spikes::spikes;
-use planish_core::monitor::NoMonitor;
+use planish_core::monitor::{Interrupted, Monitor};
 use planish_core::seams::{Curve, Passage, SeamNetwork};
 use planish_core::subdivide::{self, LinearAtlas, subdivide};
 use planish_core::topology::{ChartId, FaceId};
@@ -67,19 +67,22 @@ pub struct Export {
 
 /// Hands an atlas to Gmsh, for triangles with edges of length `size`. Warns where Gmsh would do badly; a hand-off that fails
 /// is told and leaves the maps as they are.
-pub fn gmsh(atlas: &CertifiedAtlas, size: f64) -> Export {
+///
+/// # Errors
+/// [`Interrupted`].
+pub fn gmsh(atlas: &CertifiedAtlas, size: f64, monitor: &dyn Monitor) -> Result<Export, Interrupted> {
     let (mesh, charts, network) = (atlas.mesh(), atlas.charts(), atlas.seams());
     let shortest_seam_distance = network.shortest_distance(mesh);
     let mut report = ExportReport { size, shortest_seam_distance, ..ExportReport::default() };
     report.warning = shortest_seam_distance.filter(|d| size > 0.5 * d).map(|d| too_coarse(size, d));
-    let natural = natural_maps(charts);
+    let natural = natural_maps(charts, monitor)?;
     let straight: Vec<_> = natural.iter().map(|n| n.as_ref().map(|n| &n.map)).collect();
     let linear = match subdivide(atlas, &straight) {
         Ok(linear) => linear,
         Err(error) => {
             let failure = failure(&error, charts);
             tracing::warn!("no hand-off to Gmsh: {failure}");
-            return Export { files: vec![], report: ExportReport { failure: Some(failure), ..report } };
+            return Ok(Export { files: vec![], report: ExportReport { failure: Some(failure), ..report } });
         }
     };
     let mut distortions: Vec<Summary> = charts.iter().map(|c| *c.distortion()).collect();
@@ -100,14 +103,17 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64) -> Export {
     }
     let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
     let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow, spikes };
-    Export { files: files(atlas, &linear, &script), report }
+    Ok(Export { files: files(atlas, &linear, &script), report })
 }
 
 /// Maps with a boundary of their own for the charts whose maps stretch, where these do less.
-fn natural_maps(charts: &[CertifiedChart]) -> Vec<Option<Natural>> {
+fn natural_maps(charts: &[CertifiedChart], monitor: &dyn Monitor) -> Result<Vec<Option<Natural>>, Interrupted> {
     let of_chart = |certified: &CertifiedChart| {
         let p99 = certified.distortion().conformal_p99;
-        (p99 > BENT).then(|| natural(certified.chart(), p99, &NoMonitor)).flatten()
+        if p99 <= BENT {
+            return Ok(None);
+        }
+        natural(certified.chart(), p99, monitor)
     };
     charts.iter().map(of_chart).collect()
 }

@@ -32,7 +32,7 @@ pub struct Provenance {
     /// What untangling did, where there was a harmonic map.
     pub untangle: Option<untangle::Report>,
     /// Why there is no harmonic map although it was asked for: the map is the linear one then, of degree elevated.
-    pub unsolved: Option<sparse::Error>,
+    pub unsolved: Option<sparse::Unsolvable>,
 }
 
 /// A linear map in numbers.

@@ -8,7 +8,7 @@
 //! triangles), which cannot see what vertices and edges have to do with each other.
 
 use crate::fem::dofs::Dofs;
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use crate::topology::{HalfEdgeId, VertexId};
 
 /// The order in which the vertices inside are eliminated: all of the `count` ones in `triangles` that are not on
@@ -26,7 +26,7 @@ pub(crate) fn of_vertices(triangles: &[[VertexId; 3]], count: usize, outer: &[Ha
 
 /// All nodes of quadratic elements in the order in which they are eliminated; those of which no vertex inside is an
 /// end come last.
-pub(crate) fn of_nodes(chart: &ClosedChart) -> Vec<usize> {
+pub(crate) fn of_nodes(chart: &FilledChart) -> Vec<usize> {
     let last = chart.elimination().len() as u64;
     let mut turn = vec![last; chart.vertex_count()];
     chart.elimination().iter().zip(0..).for_each(|(v, n)| turn[v.index()] = n);
@@ -41,7 +41,7 @@ pub(crate) fn of_nodes(chart: &ClosedChart) -> Vec<usize> {
 }
 
 /// The unknowns of quadratic elements in the order in which they are eliminated: all nodes but those of the outer loop.
-pub(crate) fn dofs_inside(chart: &ClosedChart) -> Dofs {
+pub(crate) fn dofs_inside(chart: &FilledChart) -> Dofs {
     let is_outer = chart.outer_nodes();
     let inside = of_nodes(chart).into_iter().filter(|n| !is_outer[*n]);
     Dofs::new(chart.node_count(), inside.map(|n| n as u32).collect())
@@ -53,14 +53,14 @@ mod tests {
     use crate::mesh::TriangleSoup;
     use crate::{decompose, repair, shapes};
 
-    fn closed(soup: &TriangleSoup) -> ClosedChart {
+    fn filled(soup: &TriangleSoup) -> FilledChart {
         let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
+        FilledChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
     }
 
     /// How many numbers the factor of quadratic elements holds, nodes on the outer loop prescribed: in our order, and in
     /// that of minimum degree on all nodes.
-    fn factor_entries(chart: &ClosedChart) -> [usize; 2] {
+    fn factor_entries(chart: &FilledChart) -> [usize; 2] {
         let pattern = dofs_inside(chart).pattern((0..chart.triangles().len()).map(|f| chart.nodes(f)));
         [pattern.analyse_as_numbered(), pattern.analyse()].map(|a| a.expect("small").factor_entries())
     }
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn every_vertex_inside_and_every_node_is_eliminated_once() {
         for soup in [shapes::disk(3), shapes::disk_with_holes(13, 2), shapes::sliver_strip(5)] {
-            let chart = closed(&soup);
+            let chart = filled(&soup);
             let mut vertices: Vec<VertexId> = chart.elimination().to_vec();
             vertices.extend(chart.outer().iter().map(|h| chart.ends(*h)[0]));
             vertices.sort_unstable();
@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn factors_are_no_larger_than_by_minimum_degree_on_all_nodes() {
         for soup in [shapes::disk(60), shapes::bent_disk(60, 0.45, 1.0), shapes::disk_with_holes(60, 3)] {
-            let [ours, plain] = factor_entries(&closed(&soup));
+            let [ours, plain] = factor_entries(&filled(&soup));
             assert!(ours <= plain, "{ours} against {plain}");
         }
     }

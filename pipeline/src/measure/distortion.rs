@@ -4,7 +4,7 @@
 
 use crate::atlas::Chart;
 use crate::certify::CertifiedMap;
-use crate::fem::bernstein::{self, ExactDet};
+use crate::fem::bernstein::{self, JacobianBezier};
 use crate::fem::element::{Barycentric, Element, P2};
 use crate::grid::GridPoint;
 use crate::topology::{Stars, VisitStamps};
@@ -42,8 +42,8 @@ pub fn fields(chart: &Chart, map: &CertifiedMap) -> Vec<CellFields> {
 
 fn cell_fields(chart: &Chart, map: &CertifiedMap, face: usize) -> CellFields {
     let nodes = map.map().cells[face].map(|n| map.map().nodes[n as usize]);
-    let coefficients = ExactDet::new(nodes).coefficients();
-    let (least, largest) = bernstein::range(coefficients);
+    let coefficients = JacobianBezier::new(nodes).coefficients();
+    let bernstein::Range { min: least, max: largest } = bernstein::range(coefficients);
     let doubled_area = 2.0 * chart.area(face);
     let (det_min, det_max) = (finite(least / doubled_area), finite(largest / doubled_area));
     CellFields {
@@ -154,7 +154,7 @@ pub fn area_ratio(chart: &Chart, map: &CertifiedMap) -> f64 {
 /// The area ratio of a map that may be invalid here and there, by the nodes of each triangle of the chart: stars whose
 /// area is not positive do not count.
 pub(crate) fn area_ratio_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [GridPoint; 6]) -> f64 {
-    let area = |f: usize| area_in_plane(&ExactDet::new(nodes(f)).coefficients());
+    let area = |f: usize| area_in_plane(&JacobianBezier::new(nodes(f)).coefficients());
     let plane: Vec<f64> = (0..chart.triangles().len()).map(area).collect();
     let mut scales = star_scales(chart, &plane);
     scales.retain(|s| s.0 > 0.0);
@@ -169,7 +169,7 @@ fn ratio(mut scales: Vec<(f64, f64)>) -> f64 {
 /// Per triangle of a map its area in the plane.
 fn plane_areas(map: &CertifiedMap) -> Vec<f64> {
     let place = |n: u32| map.map().nodes[n as usize];
-    map.map().cells.iter().map(|c| area_in_plane(&ExactDet::new(c.map(place)).coefficients())).collect()
+    map.map().cells.iter().map(|c| area_in_plane(&JacobianBezier::new(c.map(place)).coefficients())).collect()
 }
 
 /// The values at the given shares of the total weight.

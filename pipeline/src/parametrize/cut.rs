@@ -13,7 +13,7 @@ use crate::atlas::Chart;
 use crate::decompose;
 use crate::map::natural;
 use crate::measure::distortion;
-use crate::monitor::Monitor;
+use crate::monitor::{Interrupted, Monitor};
 use crate::settings::ChartSettings;
 
 /// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
@@ -72,7 +72,7 @@ impl Cutter<'_> {
     pub(super) fn parts(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Mapped>>, ChartError> {
         let on_disk = map.conformal_p99(chart);
         // Only a chart that the disk does not suit is asked for a natural map.
-        if on_disk <= STRETCHED || self.suits(chart, on_disk, STRETCHED) == Suits::Natural {
+        if on_disk <= STRETCHED || self.suits(chart, on_disk, STRETCHED)? == Suits::Natural {
             return Ok(None);
         }
         let most = chart.holes().len().max(1) * if on_disk > TORN { MANY } else { FEW };
@@ -110,7 +110,7 @@ impl Cutter<'_> {
                 // Left to the caller's rule for charts that do not map.
                 Attempt::Single => return Ok(None),
             };
-            let suits = self.suits(&part, map.conformal_p99(&part), bound);
+            let suits = self.suits(&part, map.conformal_p99(&part), bound)?;
             let parts = if suits == Suits::Neither { self.halves(&part, &map)? } else { None };
             match parts {
                 // Nothing becomes smaller.
@@ -144,15 +144,15 @@ impl Cutter<'_> {
     }
 
     /// `on_disk` is how much the map of the chart stretches.
-    fn suits(&self, chart: &Chart, on_disk: f64, bound: f64) -> Suits {
-        let natural = natural::natural(chart, on_disk, self.monitor);
-        if natural.is_some_and(|n| n.distortion.conformal_p99 <= bound) {
+    fn suits(&self, chart: &Chart, on_disk: f64, bound: f64) -> Result<Suits, Interrupted> {
+        let natural = natural::natural(chart, on_disk, self.monitor)?;
+        Ok(if natural.is_some_and(|n| n.distortion.conformal_p99 <= bound) {
             Suits::Natural
         } else if on_disk <= bound {
             Suits::Disk
         } else {
             Suits::Neither
-        }
+        })
     }
 
     /// The chart cut once: through its first hole, or where the area scale changes. None for a single triangle.

@@ -7,13 +7,13 @@ use crate::decompose;
 use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::map::boundary::{Boundary, Mids};
-use crate::map::closed::ClosedChart;
-use crate::map::linear::{self, LinearMap, linear_map, lower_ears};
-use crate::map::quadratic::{QuadraticMap, least_det, quadratic_map};
+use crate::map::filled::FilledChart;
+use crate::map::linear::{self, LinearMap, flatten_ear_arcs, linear_map};
+use crate::map::quadratic::{QuadraticMap, min_det, quadratic_map};
 use crate::measure::distortion;
 use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
 use crate::settings::{ChartSettings, Order};
-use crate::untangle::{Untangled, untangle};
+use crate::untangle::{Dirichlet, Untangled, untangle};
 
 /// A chart that is to be mapped, and what its map depends on: a value of its own, which needs neither the surface nor the
 /// other charts, and so can be done anywhere.
@@ -37,11 +37,11 @@ pub struct MappedChart {
 /// The maps of a chart before untangling.
 #[derive(Clone, Debug)]
 pub(super) struct Maps {
-    closed: ClosedChart,
+    filled: FilledChart,
     linear: LinearMap,
     start: Vec<GridPoint>,
     pub(super) certified_start: CertifiedMap,
-    harmonic: Option<Result<QuadraticMap, sparse::Error>>,
+    harmonic: Option<Result<QuadraticMap, sparse::Unsolvable>>,
 }
 
 impl Maps {
@@ -53,7 +53,7 @@ impl Maps {
             Some(Ok(map)) if !chart.holes().is_empty() => map.nodes(),
             _ => &self.start,
         };
-        distortion::conformal_p99_of_nodes(chart, |f| self.closed.nodes(f).map(|n| nodes[n]))
+        distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]))
     }
 }
 
@@ -62,7 +62,7 @@ impl Maps {
 pub enum MapError {
     /// No linear map.
     #[error(transparent)]
-    Linear(#[from] linear::Error),
+    Linear(linear::Error),
     /// The raised linear map is not one-to-one in double precision.
     #[error("the chart is too distorted for one map: {0}; it must be split")]
     Start(certify::Error),
@@ -77,6 +77,15 @@ pub enum MapError {
     /// The map was not wanted any more.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
+}
+
+impl From<linear::Error> for MapError {
+    fn from(error: linear::Error) -> Self {
+        match error {
+            linear::Error::Interrupted(interrupted) => Self::Interrupted(interrupted),
+            error => Self::Linear(error),
+        }
+    }
 }
 
 impl MapError {
@@ -227,18 +236,16 @@ pub(super) fn map_within(
 ) -> Result<Maps, MapError> {
     let checkpoint = Checkpoint::new(monitor);
     let size = chart.triangles().len();
-    let closed = ClosedChart::new(chart);
+    let filled = FilledChart::new(chart);
     checkpoint.after(size)?;
     let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
-    let mut boundary = Boundary::circle(&closed, mids);
-    let linear = linear_map(&closed, &boundary, monitor);
-    // Before its error is believed: it may have been interrupted.
+    let mut boundary = Boundary::circle(&filled, mids);
+    let linear = linear_map(&filled, &boundary, monitor)?;
     checkpoint.end()?;
-    let linear = linear?;
-    lower_ears(&closed, &linear, &mut boundary);
-    let start = linear.raised(&closed, &boundary);
-    let centres = (0..closed.loops().len()).map(|k| start[closed.centre_node(k)]).collect();
-    let certified_start = prove(planar(&closed, &start, centres)).map_err(MapError::Start)?;
+    flatten_ear_arcs(&filled, &linear, &mut boundary);
+    let start = linear.degree_elevated(&filled, &boundary);
+    let centres = (0..filled.loops().len()).map(|k| start[filled.centre_node(k)]).collect();
+    let certified_start = prove(planar(&filled, &start, centres)).map_err(MapError::Start)?;
     checkpoint.after(size)?;
     let ratio = distortion::area_ratio(chart, &certified_start);
     let within = |ratio: f64, bound: f64| {
@@ -246,13 +253,18 @@ pub(super) fn map_within(
         if ratio > bound { Err(stretched()) } else { Ok(()) }
     };
     within(ratio, if order == Order::Linear { max_area_ratio } else { HOPELESS * max_area_ratio })?;
-    let harmonic = (order == Order::Quadratic).then(|| quadratic_map(&closed, &boundary, monitor));
+    let harmonic = match (order == Order::Quadratic).then(|| quadratic_map(&filled, &boundary, monitor)) {
+        None => None,
+        Some(Ok(map)) => Some(Ok(map)),
+        Some(Err(sparse::Error::Unsolvable(unsolvable))) => Some(Err(unsolvable)),
+        Some(Err(sparse::Error::Interrupted(interrupted))) => return Err(interrupted.into()),
+    };
     if let Some(Ok(map)) = &harmonic {
-        let of_harmonic = distortion::area_ratio_of_nodes(chart, |f| closed.nodes(f).map(|n| map.nodes()[n]));
+        let of_harmonic = distortion::area_ratio_of_nodes(chart, |f| filled.nodes(f).map(|n| map.nodes()[n]));
         within(ratio.sqrt() * of_harmonic.sqrt(), max_area_ratio)?;
     }
     checkpoint.end()?;
-    Ok(Maps { closed, linear, start, certified_start, harmonic })
+    Ok(Maps { filled, linear, start, certified_start, harmonic })
 }
 
 /// A chart whose linear map is above the largest area ratio by this factor is split at once. Below it the harmonic map
@@ -277,7 +289,7 @@ impl ProvenMap {
 /// Untangles the harmonic map, if there is one, and certifies the result; where that cannot be proven, the result is the
 /// feasible start.
 fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, Interrupted> {
-    let Maps { closed, linear, start, certified_start, harmonic } = maps;
+    let Maps { filled, linear, start, certified_start, harmonic } = maps;
     let linear =
         LinearSummary { folded: linear.folded(), edges_changed: linear.edges_changed(), method: linear.method() };
     let (harmonic, unsolved) = match harmonic {
@@ -289,15 +301,16 @@ fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, 
         let provenance = Provenance { linear, harmonic: None, untangle: None, unsolved };
         return Ok(ProvenMap { map: certified_start.clone(), start: certified_start, provenance });
     };
-    let mut invalid = vec![false; closed.own_triangles()];
+    let mut invalid = vec![false; filled.chart_triangles()];
     map.invalid().iter().for_each(|f| invalid[f.index()] = true);
-    let harmonic = Some(Harmonic { invalid, det_min: least_det(&closed, &map) });
-    let Untangled { nodes, hole_centres, mut report } = untangle(&closed, &start, &map, monitor);
+    let harmonic = Some(Harmonic { invalid, det_min: min_det(&filled, &map) });
+    let energy = Dirichlet::new(filled.shapes());
+    let Untangled { nodes, hole_centres, mut report } = untangle(&filled, &energy, &start, &map, monitor)?;
     Checkpoint::new(monitor).end()?;
-    let certified = match prove(planar(&closed, &nodes, hole_centres)) {
+    let certified = match prove(planar(&filled, &nodes, hole_centres)) {
         Ok(certified) => certified,
         Err(_) => {
-            report = report.of_start(&closed, &start, &map);
+            report = report.of_start(&filled, &start, &map);
             certified_start.clone()
         }
     };
@@ -306,7 +319,7 @@ fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, 
 }
 
 /// The part of a map that is published: the chart without its fans.
-fn planar(closed: &ClosedChart, nodes: &[GridPoint], hole_centres: Vec<GridPoint>) -> PlanarMap {
-    let cells = (0..closed.own_triangles()).map(|f| closed.nodes(f).map(|n| n as u32)).collect();
-    PlanarMap { cells, nodes: nodes[..closed.own_nodes()].to_vec(), hole_centres }
+fn planar(filled: &FilledChart, nodes: &[GridPoint], hole_centres: Vec<GridPoint>) -> PlanarMap {
+    let cells = (0..filled.chart_triangles()).map(|f| filled.nodes(f).map(|n| n as u32)).collect();
+    PlanarMap { cells, nodes: nodes[..filled.chart_nodes()].to_vec(), hole_centres }
 }

@@ -16,7 +16,7 @@ use crate::monitor::Monitor;
 /// The least squares conformal map of `chart`; none where it is not one-to-one.
 ///
 /// # Errors
-/// The system cannot be solved.
+/// The system cannot be solved, or interrupted.
 pub fn conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Option<Natural>, sparse::Error> {
     let held = far_apart(chart);
     let nodes = chart.vertices().len() + chart.edges().len();

@@ -16,9 +16,10 @@ mod projection;
 
 use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
+use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, quantiles, singular_ratio};
-use crate::monitor::Monitor;
+use crate::monitor::{Interrupted, Monitor};
 pub use conformal::conformal;
 pub use projection::projection;
 
@@ -50,21 +51,30 @@ const EVEN: f64 = 100.0;
 
 /// A natural map that stretches `chart` less than `on_disk`, the conformal distortion that its map on
 /// the disk does not exceed on 99 % of the area; none where there is none, or that is not found by reasonable means.
-pub fn natural(chart: &Chart, on_disk: f64, monitor: &dyn Monitor) -> Option<Natural> {
-    let unrolled = || {
-        let is_wanted = on_disk > UNEVEN && chart.triangles().len() <= UNROLLED;
-        // Where the system cannot be solved, there is the map on the disk.
-        let found = is_wanted.then(|| conformal(chart, monitor).ok()).flatten().flatten();
-        found.filter(|n| n.distortion.conformal_p99 < on_disk)
-    };
+///
+/// # Errors
+/// [`Interrupted`].
+pub fn natural(chart: &Chart, on_disk: f64, monitor: &dyn Monitor) -> Result<Option<Natural>, Interrupted> {
     let is_even = |n: &Natural| n.distortion.area_ratio < EVEN;
-    projection(chart, on_disk.min(STEEP)).filter(is_even).or_else(unrolled).filter(is_even)
+    if let Some(projected) = projection(chart, on_disk.min(STEEP)).filter(is_even) {
+        return Ok(Some(projected));
+    }
+    if on_disk <= UNEVEN || chart.triangles().len() > UNROLLED {
+        return Ok(None);
+    }
+    let unrolled = match conformal(chart, monitor) {
+        Ok(unrolled) => unrolled,
+        Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted),
+        // There is the map on the disk.
+        Err(sparse::Error::Unsolvable(_)) => None,
+    };
+    Ok(unrolled.filter(|n| n.distortion.conformal_p99 < on_disk && is_even(n)))
 }
 
-/// The map with the nodes of a chart at `places` (its vertices, then the middles of its edges), scaled to fit and
+/// The map with the nodes of a chart at `uv` (its vertices, then the middles of its edges), scaled to fit and
 /// rounded to the grid; none where it is not one-to-one.
-fn certified(chart: &Chart, places: &[[f64; 2]]) -> Option<Natural> {
-    let nodes = fitted(places)?.into_iter().map(GridPoint::mid).collect();
+fn certified(chart: &Chart, uv: &[[f64; 2]]) -> Option<Natural> {
+    let nodes = fitted(uv)?.into_iter().map(GridPoint::mid).collect();
     let map = PlanarMap { cells: chart.cells().collect(), nodes, hole_centres: vec![] };
     let map = prove_straight(map).ok()?;
     let distortion = summary(chart, map.map());
@@ -72,14 +82,14 @@ fn certified(chart: &Chart, places: &[[f64; 2]]) -> Option<Natural> {
 }
 
 /// Places moved and scaled into a disk of [`RADIUS`] around the origin; none where they all are one, or not finite.
-fn fitted(places: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-    let bound = |k: usize, f: fn(f64, f64) -> f64, start| places.iter().map(|p| p[k]).fold(start, f);
-    let least = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
-    let most = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
-    let half = 0.5 * (most[0] - least[0]).hypot(most[1] - least[1]);
+fn fitted(uv: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+    let bound = |k: usize, f: fn(f64, f64) -> f64, start| uv.iter().map(|p| p[k]).fold(start, f);
+    let min = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
+    let max = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
+    let half = 0.5 * (max[0] - min[0]).hypot(max[1] - min[1]);
     let scale = RADIUS / half;
-    let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (least[k] + most[k])) * scale);
-    (scale.is_finite() && scale > 0.0).then(|| places.iter().map(moved).collect())
+    let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (min[k] + max[k])) * scale);
+    (scale.is_finite() && scale > 0.0).then(|| uv.iter().map(moved).collect())
 }
 
 /// How much the parts of a chart's triangles are stretched. The area ratio is that of parts, not of stars.
@@ -92,28 +102,36 @@ fn summary(chart: &Chart, map: &PlanarMap) -> Summary {
         let flat = [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
         let area = 0.25 * shape.area();
         for (from, to) in parts(flat).into_iter().zip(parts(uv)) {
-            let (stretch, scale) = stretch(from, to);
-            conformal.push((stretch, area));
-            scales.push((scale, area));
+            let stretch = Stretch::between(from, to);
+            conformal.push((stretch.conformal, area));
+            scales.push((stretch.area, area));
         }
     }
     let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
-    let [least, most] = quantiles(&mut scales, [0.001, 0.999]);
-    Summary { conformal_median, conformal_p99, area_ratio: (most / least).clamp(1.0, f64::MAX) }
+    let [min, max] = quantiles(&mut scales, [0.001, 0.999]);
+    Summary { conformal_median, conformal_p99, area_ratio: (max / min).clamp(1.0, f64::MAX) }
 }
 
-/// The ratio of the singular values of the linear map from one triangle of the plane to another, and that of their
-/// areas.
-fn stretch(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> (f64, f64) {
-    let sides = |t: [[f64; 2]; 3]| [1, 2].map(|i| [t[i][0] - t[0][0], t[i][1] - t[0][1]]);
-    let ([p, q], [u, v]) = (sides(from), sides(to));
-    let doubled = p[0] * q[1] - p[1] * q[0];
-    // The columns of the matrix.
-    let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled);
-    let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled);
-    let det = x[0] * y[1] - x[1] * y[0];
-    let bounded = |x: f64| if x.is_finite() && x > 0.0 { x } else { f64::MAX };
-    (bounded(singular_ratio(x, y, det)).max(1.0), bounded(det))
+/// How the linear map from one triangle of the plane to another stretches.
+struct Stretch {
+    /// The ratio of its singular values, at least 1.
+    conformal: f64,
+    /// The ratio of areas.
+    area: f64,
+}
+
+impl Stretch {
+    fn between(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> Self {
+        let sides = |t: [[f64; 2]; 3]| [1, 2].map(|i| [t[i][0] - t[0][0], t[i][1] - t[0][1]]);
+        let ([p, q], [u, v]) = (sides(from), sides(to));
+        let doubled = p[0] * q[1] - p[1] * q[0];
+        // The columns of the matrix.
+        let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled);
+        let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled);
+        let det = x[0] * y[1] - x[1] * y[0];
+        let bounded = |x: f64| if x.is_finite() && x > 0.0 { x } else { f64::MAX };
+        Self { conformal: bounded(singular_ratio(x, y, det)).max(1.0), area: bounded(det) }
+    }
 }
 
 #[cfg(test)]

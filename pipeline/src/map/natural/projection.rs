@@ -25,11 +25,11 @@ pub fn projection(chart: &Chart, most: f64) -> Option<Natural> {
     if p99 > most {
         return None;
     }
-    let mut places: Vec<[f64; 2]> = chart.points().iter().map(|p| plane.place(*p)).collect();
+    let mut uv: Vec<[f64; 2]> = chart.points().iter().map(|p| plane.place(*p)).collect();
     for (_, sides) in chart.edges().iter() {
         let [h, t] = [sides[0], sides[0].next()];
-        let ends = [chart.from(h), chart.from(t)].map(|v| places[v.index()]);
-        places.push([0, 1].map(|k| 0.5 * (ends[0][k] + ends[1][k])));
+        let ends = [chart.from(h), chart.from(t)].map(|v| uv[v.index()]);
+        uv.push([0, 1].map(|k| 0.5 * (ends[0][k] + ends[1][k])));
     }
-    certified(chart, &places)
+    certified(chart, &uv)
 }
