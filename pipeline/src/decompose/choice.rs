@@ -60,10 +60,9 @@ impl Choice<'_> {
         let labels = self.cells.of.iter().map(|c| charts.of[*c as usize]).collect();
         let mut network = Network::new(self.dual, labels, self.limits).keeping(RELAXED);
         self.dual.checkpoint()?;
-        relax(&mut network, 1.0, |label| open[component[label as usize]]);
-        self.dual.checkpoint()?;
+        relax(&mut network, 1.0, |label| open[component[label as usize]])?;
         let mut counts = vec![0; tried.len()];
-        for (component, verdict) in component.into_iter().zip(judge(&network, self.cells)) {
+        for (component, verdict) in component.into_iter().zip(judge(&network, self.cells)?) {
             counts[component] += self.parts(verdict);
         }
         Ok(counts)

@@ -49,13 +49,15 @@ pub(super) fn with_features<'a>(
 ) -> Result<(Dual<'a>, usize), Interrupted> {
     let mut dual = Dual::new(mesh, monitor);
     dual.checkpoint()?;
-    let count = settings.feature_angle.map_or(0, |angle| mark_features(&mut dual, angle));
-    dual.checkpoint()?;
+    let count = match settings.feature_angle {
+        Some(angle) => mark_features(&mut dual, angle)?,
+        None => 0,
+    };
     Ok((dual, count))
 }
 
 /// Marks the feature edges of `dual`: dihedral angle above `angle` degrees. Returns their number.
-fn mark_features(dual: &mut Dual, angle: f64) -> usize {
+fn mark_features(dual: &mut Dual, angle: f64) -> Result<usize, Interrupted> {
     let cos = |degrees: f64| degrees.to_radians().cos();
     let (sharp, blunt) = (cos(angle), cos(LOWER * angle));
     let normals: Vec<Vec3> = (0..dual.mesh.triangles().len()).map(|f| dual.area_vector(f)).collect();
@@ -82,9 +84,12 @@ fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     }
     let kept: Vec<HalfEdgeId> = kept.into_iter().map(|k| k.0).collect();
     // Every time some patches are united with others, so that fewer are left.
-    while dual.checkpoint().is_ok() && drop_small_patches(dual, &kept) {}
+    dual.checkpoint()?;
+    while drop_small_patches(dual, &kept) {
+        dual.checkpoint()?;
+    }
     drop_dangling(dual, &kept);
-    dual.sharpness.iter().filter(|s| **s > 0.0).count()
+    Ok(dual.sharpness.iter().filter(|s| **s > 0.0).count())
 }
 
 /// Unites each patch that is too small to be a face with the neighbour with which it shares most: the features between

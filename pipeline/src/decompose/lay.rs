@@ -211,12 +211,11 @@ mod tests {
         let bounds =
             Bounds { goal: Goal::Vertex(target), labels: &labels, length: f64::INFINITY, band: &band, barred: &barred };
         let mut tree = Tree::new(network.dual);
-        tree.grow(network, root, &bounds);
-        if root == target || tree.distance(target).is_none() {
+        tree.grow(network, root, &bounds).expect("nobody interrupts");
+        let Some(half_edges) = tree.path(network.dual, target).filter(|path| !path.is_empty()) else {
             network.put_back(path);
             return None;
-        }
-        let half_edges = tree.path(network.dual, target);
+        };
         Some(network.lay(path, &[Path { half_edges, left, right }], &labels))
     }
 

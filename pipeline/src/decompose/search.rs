@@ -7,7 +7,7 @@
 use super::complex::{Complex, NONE};
 use super::merge::{Limits, Merge, Weights};
 use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
-use super::regions::{Outline, Region, Regions};
+use super::regions::{Region, Regions};
 use super::sides::{Axes, axes, faces};
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use crate::monitor::{Checkpoint, Interrupted};
@@ -92,7 +92,7 @@ impl Search<'_> {
     pub(super) fn run(&self) -> Result<Found, Interrupted> {
         let components = farthest_first(self.graph, |_| 1);
         let whole = Regions::new(self.complex, components.of.clone(), components.count);
-        let whole = self.fine(whole, WHOLE * self.bound);
+        let whole = self.fine(whole, WHOLE * self.bound)?;
         let mut ways = vec![components.of.clone()];
         let left_whole = |w: &bool| if *w { vec![(Score { charts: 1, beauty: 0.0 }, 0)] } else { vec![] };
         let mut ranked: Vec<Vec<(Score, usize)>> = whole.iter().map(left_whole).collect();
@@ -111,15 +111,17 @@ impl Search<'_> {
         Ok(Found { components, ranked, ways })
     }
 
-    /// Per region, whether it may be a chart with at most this area ratio; all, where nobody waits for it any more.
-    fn fine(&self, mut regions: Regions, largest: f64) -> Vec<bool> {
-        let outlines: Vec<_> = (0..regions.all.len() as u32).map(|r| regions.outline_of(r)).collect();
-        let judge = |(region, outline): (&Region, &Outline)| {
-            let ratio = || area_ratio(self.complex, self.graph, &region.cells, &outline.loops).0;
-            let allowed = || self.limits.allow(&regions.shape(region, outline)) && ratio() <= largest;
-            !self.checkpoint.goes_on(WORK_PER_CELL * region.cells.len()) || allowed()
-        };
-        regions.all.iter().zip(&outlines).map(judge).collect()
+    /// Per region, whether it may be a chart with at most this area ratio.
+    fn fine(&self, mut regions: Regions, largest: f64) -> Result<Vec<bool>, Interrupted> {
+        let mut fine = Vec::with_capacity(regions.all.len());
+        for label in 0..regions.all.len() {
+            let outline = regions.outline_of(label as u32);
+            let region = &regions.all[label];
+            self.checkpoint.after(WORK_PER_CELL * region.cells.len())?;
+            let is_allowed = self.limits.allow(&regions.shape(region, &outline));
+            fine.push(is_allowed && area_ratio(self.complex, self.graph, &region.cells, &outline.loops).0 <= largest);
+        }
+        Ok(fine)
     }
 
     /// Grows charts one way: per cell its chart, and the score of every component.
@@ -134,7 +136,7 @@ impl Search<'_> {
         let groups = farthest_first(self.graph, |part| if is_whole(part[0]) { 1 } else { way.regions });
         let groups = bisect_until(self.graph, groups, |groups| {
             self.fine(Regions::new(self.complex, groups.of.clone(), groups.count), self.limits.area_ratio)
-        });
+        })?;
         let mut regions = Regions::new(self.complex, groups.of, groups.count);
         let component = |r: &Region| r.cells.first().map_or(0, |c| components.of[*c as usize]);
         let side = |axis: usize| {

@@ -6,6 +6,7 @@
 
 mod census;
 pub(crate) mod csr;
+pub(crate) mod dijkstra;
 mod edges;
 mod id;
 mod stars;
