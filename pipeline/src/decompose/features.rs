@@ -12,6 +12,7 @@ use super::Settings;
 use super::dual::Dual;
 use crate::mesh::SurfaceMesh;
 use crate::monitor::{Interrupted, Monitor};
+use crate::topology::partition::Partition;
 use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId};
 use crate::vec3::{Vec3, dot, norm};
@@ -125,11 +126,12 @@ fn small_patches(dual: &Dual, patch_of: &[u32], count: usize) -> Vec<bool> {
     for (f, patch) in patch_of.iter().enumerate() {
         areas[*patch as usize] += dual.area(f);
     }
-    let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
-    for h in dual.half_edges().filter(|h| dual.across(*h).is_none_or(|t| patch(t) != patch(*h))) {
-        let sharpness = if dual.across(h).is_none() { 1.0 } else { dual.sharpness(h) };
-        outlines[patch(h)] += dual.length(h);
-        weighed[patch(h)] += sharpness * dual.length(h);
+    let patches = Partition::new(dual, patch_of);
+    for h in patches.boundary() {
+        let patch = patches.label(h) as usize;
+        let sharpness = if patches.is_seam(h) { dual.sharpness(h) } else { 1.0 };
+        outlines[patch] += dual.length(h);
+        weighed[patch] += sharpness * dual.length(h);
     }
     let (least, width) = (least_outline(dual), LEAST_WIDTH * dual.total_area().sqrt());
     let is_bevel = |p: usize| 2.0 * areas[p] < width * outlines[p] && weighed[p] < BLUNT * outlines[p];
@@ -148,13 +150,7 @@ fn drop_dangling(dual: &mut Dual, features: &[HalfEdgeId]) {
 
 /// Per triangle the patch between features to which it belongs, and their number.
 fn patches(dual: &Dual) -> (Vec<u32>, usize) {
-    let mut sets = UnionFind::new(dual.mesh.triangles().len());
-    for h in dual.half_edges().filter(|h| !dual.is_feature(*h)) {
-        if let Some(t) = dual.across(h) {
-            sets.unite(h.face().index(), t.face().index());
-        }
-    }
-    sets.labels()
+    dual.united(|h, _| !dual.is_feature(h)).labels()
 }
 
 /// Whether two normals (of any length) differ by more than the angle with this cosine.

@@ -14,7 +14,7 @@ use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
 use crate::mesh::SurfaceMesh;
 use crate::monitor::{Interrupted, Monitor};
-use crate::topology::union_find::UnionFind;
+use crate::topology::partition::Partition;
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
 /// Where to cut, as shares of the range of the logarithm of the area scale: the middle first.
@@ -87,7 +87,8 @@ pub fn halve(
 /// Per triangle 0 or 1, the side of the largest connected part of one side that is the fewest triangles away.
 fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
     let count = is_left.len();
-    let mut parts = joined(dual, |f, g| is_left[f] == is_left[g]);
+    let side = |h: HalfEdgeId| is_left[h.face().index()];
+    let mut parts = dual.united(|h, twin| side(h) == side(twin));
     let roots: Vec<usize> = (0..count).map(|f| parts.find(f)).collect();
     let mut sizes = vec![0; count];
     roots.iter().for_each(|r| sizes[*r] += 1);
@@ -211,9 +212,8 @@ fn across_protrusion(dual: &Dual, log_scale: &[f64], limits: &Limits) -> Result<
 }
 
 fn cut_length(dual: &Dual, labels: &[u32]) -> f64 {
-    let label = |h: HalfEdgeId| labels[h.face().index()];
-    let cut = |h: &HalfEdgeId| dual.across(*h).is_some_and(|t| label(t) != label(*h));
-    dual.half_edges().filter(cut).map(|h| dual.length(h)).sum()
+    let parts = Partition::new(dual, labels);
+    dual.half_edges().filter(|h| parts.is_seam(*h)).map(|h| dual.length(h)).sum()
 }
 
 /// Label 1 for the connected region below `level` that holds the least scale, filled up so that the rest (label 0),
@@ -230,19 +230,8 @@ fn below(dual: &Dual, log_scale: &[f64], level: f64) -> Option<Vec<u32>> {
 
 /// The triangles among those that `admit` tells which are connected to `seed`.
 fn connected(dual: &Dual, seed: usize, admit: impl Fn(usize) -> bool) -> Vec<bool> {
-    let mut sets = joined(dual, |f, g| admit(f) && admit(g));
+    let admits = |h: HalfEdgeId| admit(h.face().index());
+    let mut sets = dual.united(|h, twin| admits(h) && admits(twin));
     let root = sets.find(seed);
-    (0..dual.mesh.triangles().len()).map(|f| admit(FaceId::at(f).index()) && sets.find(f) == root).collect()
-}
-
-/// The triangles, united with those neighbours with which they are `together`.
-fn joined(dual: &Dual, together: impl Fn(usize, usize) -> bool) -> UnionFind {
-    let mut sets = UnionFind::new(dual.mesh.triangles().len());
-    for h in dual.half_edges() {
-        let beyond = dual.across(h).map(|t| t.face().index());
-        if let Some(other) = beyond.filter(|other| together(h.face().index(), *other)) {
-            sets.unite(h.face().index(), other);
-        }
-    }
-    sets
+    (0..dual.mesh.triangles().len()).map(|f| admit(f) && sets.find(f) == root).collect()
 }
