@@ -6,7 +6,7 @@
 
 use super::complex::Complex;
 use super::network::Network;
-use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
+use super::predict::{CellGraph, WORK_PER_CELL, predict};
 use super::regions::Regions;
 use super::voronoi::Cells;
 use crate::atlas::Atlas;
@@ -35,9 +35,10 @@ pub(super) fn judge(network: &Network, cells: &Cells) -> Result<Vec<Option<Verdi
     for label in 0..network.label_count() {
         network.dual.checkpoint.after(WORK_PER_CELL * regions.all[label].cells.len())?;
         let outline = regions.outline_of(label as u32);
-        let (ratio, outer) = area_ratio(&complex, &graph, &regions.all[label].cells, &outline.loops);
-        let first_arc = outline.loops.get(outer).and_then(|l| l.first());
-        verdicts.push(first_arc.map(|arc| Verdict { ratio, outer: complex.arcs[*arc as usize].first }));
+        let map = predict(&complex, &graph, &regions.all[label].cells, &outline.loops);
+        let first_arc = outline.loops.get(map.outer).and_then(|l| l.first());
+        let outer = first_arc.map(|arc| complex.arcs[*arc as usize].first);
+        verdicts.push(outer.map(|outer| Verdict { ratio: map.area_ratio, outer }));
     }
     Ok(verdicts)
 }
