@@ -16,7 +16,7 @@ use std::cell::Cell;
 /// not, each has a monitor of its own.
 pub trait Monitor: Sync {
     /// A safe point: whether the result is still wanted. May block for a while, when it is the turn of others. Once the
-    /// answer is no it must stay so: a computation that stops early relies on it when it asks once more at its end.
+    /// answer is no it must stay so.
     fn should_continue(&self) -> bool;
 
     /// Waits until `bytes` of memory may be taken. One request may be larger than any budget: then it should be granted
@@ -73,27 +73,25 @@ const WORK: usize = 20_000;
 pub(crate) struct Checkpoint<'a> {
     pub monitor: &'a dyn Monitor,
     done: Cell<usize>,
-    over: Cell<bool>,
 }
 
 impl<'a> Checkpoint<'a> {
     pub(crate) fn new(monitor: &'a dyn Monitor) -> Self {
-        Self { monitor, done: Cell::new(0), over: Cell::new(false) }
+        Self { monitor, done: Cell::new(0) }
     }
 
-    /// Whether to go on after `work`, in triangles looked at.
-    pub(crate) fn goes_on(&self, work: usize) -> bool {
-        self.done.set(self.done.get() + work);
-        if self.done.get() >= WORK && !self.over.get() {
-            self.done.set(0);
-            self.over.set(!self.monitor.should_continue());
-        }
-        !self.over.get()
-    }
-
-    /// As [`Self::goes_on`].
+    /// Goes on after `work`, in triangles looked at, unless the result is not wanted any more.
     pub(crate) fn after(&self, work: usize) -> Result<(), Interrupted> {
-        if self.goes_on(work) { Ok(()) } else { Err(Interrupted) }
+        self.done.set(self.done.get() + work);
+        if self.done.get() < WORK {
+            return Ok(());
+        }
+        if !self.monitor.should_continue() {
+            // Whoever went on all the same would be told so at once.
+            return Err(Interrupted);
+        }
+        self.done.set(0);
+        Ok(())
     }
 
     /// Asks at once: before a result is returned.
@@ -202,6 +200,65 @@ mod tests {
                 monitor.most();
             }
             assert!(maps(&mesh, &settings, &Watchful::new(asked)).expect("maps") == wanted);
+        }
+    }
+
+    /// Says yes so many times, then no; whoever asks again went on after it was interrupted.
+    struct Once {
+        patience: usize,
+        asked: AtomicUsize,
+    }
+
+    impl Once {
+        fn new(patience: usize) -> Self {
+            Self { patience, asked: AtomicUsize::new(0) }
+        }
+    }
+
+    impl Monitor for Once {
+        fn should_continue(&self) -> bool {
+            let before = self.asked.fetch_add(1, Relaxed);
+            assert!(before <= self.patience, "asked again after the answer was no");
+            before < self.patience
+        }
+
+        fn reserve(&self, _bytes: u64) {}
+
+        fn release(&self, _bytes: u64) {}
+    }
+
+    #[test]
+    fn decomposition_does_nothing_more_once_it_is_interrupted() {
+        type Job<'a> = Box<dyn Fn(&dyn Monitor) -> Result<usize, decompose::Error> + 'a>;
+        let smooth = decompose::Settings { feature_angle: None, ..Default::default() };
+        let featured = decompose::Settings { max_area_ratio: 30.0, ..Default::default() };
+        let torus = surface(&shapes::ring_torus(60, 32));
+        let tube = surface(&shapes::tube(24, 80, 20.0));
+        let disk = surface(&shapes::bent_disk(40, 0.45, 1.0));
+        let chart =
+            decompose::assemble(&disk, &vec![0; disk.triangles().len()]).expect("one chart").into_charts().remove(0);
+        let scales: Vec<f64> = (0..disk.triangles().len()).map(|f| disk.corners(f)[0][0]).collect();
+        let is_left: Vec<bool> = scales.iter().map(|x| *x > 0.0).collect();
+        let split = |scales: Option<&[f64]>, monitor: &dyn Monitor| {
+            Ok(decompose::split(&chart, scales, &smooth, monitor)?.map_or(0, |parts| parts.len()))
+        };
+        let jobs: [Job; 5] = [
+            Box::new(|monitor| Ok(decompose(&torus, &smooth, monitor)?.charts().len())),
+            Box::new(|monitor| Ok(decompose(&tube, &featured, monitor)?.charts().len())),
+            Box::new(|monitor| split(Some(&scales), monitor)),
+            Box::new(|monitor| split(None, monitor)),
+            Box::new(|monitor| Ok(decompose::halve(&chart, &is_left, &smooth, monitor)?.len())),
+        ];
+        for (number, job) in jobs.iter().enumerate() {
+            let patient = Once::new(usize::MAX);
+            let wanted = job(&patient).expect("nobody interrupts");
+            let asked = patient.asked.into_inner();
+            assert!(asked > 3, "job {number} asks {asked} times");
+            for patience in (0..asked).step_by(asked.div_ceil(12)).chain([asked - 1]) {
+                let got = job(&Once::new(patience));
+                assert_eq!(got, Err(Interrupted.into()), "job {number} after {patience} of {asked} answers");
+            }
+            assert_eq!(job(&Once::new(asked)), Ok(wanted));
         }
     }
 

@@ -19,6 +19,7 @@ pub(crate) use distance::segment_distance;
 use crate::atlas::Chart;
 use crate::mesh::SurfaceMesh;
 use crate::topology::csr::Csr;
+use crate::topology::loops::cut_at_corners;
 use crate::topology::{ChartId, CurveId, HalfEdgeId, VertexId};
 use crate::vec3::distance;
 
@@ -310,11 +311,8 @@ impl<'a> Tracer<'a> {
 
     /// A loop cut at its corners; whole where it has none.
     fn runs(&self, turn: std::ops::Range<usize>) -> Vec<Vec<usize>> {
-        let begins = |s: &usize| self.corner[self.boundary.steps[*s].from as usize];
-        let mut steps: Vec<usize> = turn.collect();
-        let first = steps.iter().position(begins).unwrap_or(0);
-        steps.rotate_left(first);
-        steps.chunk_by(|_, next| !begins(next)).map(<[usize]>::to_vec).collect()
+        let steps: Vec<usize> = turn.collect();
+        cut_at_corners(&steps, |s| self.corner[self.boundary.steps[*s].from as usize])
     }
 
     /// Adds a run of a loop to its curve, which is made where the run is the first one there.

@@ -2,6 +2,7 @@
 
 use crate::topology::FaceId;
 use crate::topology::csr::Csr;
+use crate::topology::loops::closed_loops;
 
 /// An arc of the boundary by its nodes: first vertex, middle, second vertex, with its triangle on the left.
 pub(super) type ArcNodes = [u32; 3];
@@ -83,7 +84,7 @@ pub(super) fn boundary_loops(cells: &[[u32; 6]], nodes: usize) -> Result<Vec<Vec
         }
     }
     check_roles(cells, &middle_of)?;
-    Ok(follow(out))
+    loops_of(out)
 }
 
 fn check_nodes(cells: &[[u32; 6]], nodes: usize) -> Result<(), IncidenceError> {
@@ -124,20 +125,15 @@ fn all_sides(cells: &[[u32; 6]], nodes: usize) -> Vec<Side> {
     sides
 }
 
-/// Strings the boundary arcs together. Each vertex has at most one arc out; the boundary of oriented triangles
-/// also has as many in, so every walk returns to its start. Ends because each arc is taken once.
-fn follow(mut out: Vec<Option<[u32; 2]>>) -> Vec<Vec<ArcNodes>> {
-    let mut loops = Vec::new();
-    for start in 0..out.len() {
-        let mut turn = Vec::new();
-        let mut at = start as u32;
-        while let Some([mid, to]) = out[at as usize].take() {
-            turn.push([at, mid, to]);
-            at = to;
-        }
-        if !turn.is_empty() {
-            loops.push(turn);
-        }
-    }
-    loops
+/// Strings the boundary arcs together, from the least node of each loop on. Each vertex has at most one arc out; the
+/// boundary of oriented triangles also has as many in, so every walk returns to its start. (The walk itself is the one that
+/// makers of charts use; what it walks over is found here from the cells alone, and a walk that did not close would be an
+/// error.)
+fn loops_of(mut out: Vec<Option<[u32; 2]>>) -> Result<Vec<Vec<ArcNodes>>, IncidenceError> {
+    let nodes = 0..out.len() as u32;
+    let loops = closed_loops(nodes, |from| {
+        let [mid, to] = out[from as usize].take()?;
+        Some(([from, mid, to], to))
+    });
+    loops.map_err(|node| IncidenceError::Pinched { node })
 }

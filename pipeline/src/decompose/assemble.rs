@@ -3,7 +3,6 @@
 use super::legality::{self, Illegal};
 use crate::atlas::{Atlas, Chart};
 use crate::mesh::SurfaceMesh;
-use crate::topology::EdgeTable;
 use crate::topology::{ChartId, FaceId, HalfEdgeId, VertexId};
 
 /// The atlas in which the triangles of equal label form a chart. Charts are numbered in the order of their first
@@ -77,10 +76,9 @@ fn chart(mesh: &SurfaceMesh, id: ChartId, faces: Vec<FaceId>, places: &mut Place
     let triangles: Vec<_> = faces.iter().map(|f| mesh.triangles()[f.index()].map(local)).collect();
     let inside = |f: FaceId| Some(places.faces[f.index()]).filter(|p| p.0 == id.0).map(|p| FaceId(p.1));
     let edges = mesh.edges().part(&faces, inside);
-    legality::verify(id, &triangles, &edges, vertices.len())?;
+    let mut loops = legality::verify(id, &triangles, &edges, vertices.len())?;
     let shapes = faces.iter().map(|f| mesh.metric().shapes[f.index()]).collect();
     let flagged = faces.iter().map(|f| mesh.metric().flagged[f.index()]).collect();
-    let mut loops = boundary_loops(&triangles, &edges, vertices.len());
     let scale = mesh.metric().scale;
     let patch = mesh.patch(&vertices, &faces);
     let (outer, holes) = (vec![], vec![]);
@@ -91,29 +89,4 @@ fn chart(mesh: &SurfaceMesh, id: ChartId, faces: Vec<FaceId>, places: &mut Place
     chart.outer = loops.remove(longest);
     chart.holes = loops;
     Ok(chart)
-}
-
-/// The boundary loops, each from its least half-edge on, in the order of these. Every boundary vertex has one
-/// boundary half-edge out and one in, so following them returns to the start.
-fn boundary_loops(triangles: &[[VertexId; 3]], edges: &EdgeTable, vertices: usize) -> Vec<Vec<HalfEdgeId>> {
-    let from = |h: HalfEdgeId| triangles[h.face().index()][h.side()];
-    let to = |h: HalfEdgeId| triangles[h.face().index()][h.next().side()];
-    let boundary: Vec<HalfEdgeId> =
-        (0..3 * triangles.len()).map(HalfEdgeId::at).filter(|h| edges.is_boundary(*h)).collect();
-    let mut out: Vec<Option<HalfEdgeId>> = vec![None; vertices];
-    boundary.iter().for_each(|h| out[from(*h).index()] = Some(*h));
-    let mut loops = Vec::new();
-    for start in boundary {
-        let mut turn = Vec::new();
-        let mut at = from(start);
-        // Taking the half-edge away ends the walk: each is visited once.
-        while let Some(h) = out[at.index()].take() {
-            turn.push(h);
-            at = to(h);
-        }
-        if !turn.is_empty() {
-            loops.push(turn);
-        }
-    }
-    loops
 }

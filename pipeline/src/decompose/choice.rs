@@ -28,18 +28,19 @@ pub(super) struct Choice<'a> {
 impl Choice<'_> {
     /// Per cell its chart.
     pub(super) fn of(&self, found: &Found) -> Result<Cells, Interrupted> {
-        let mut best: Vec<usize> = found.ranked.iter().map(|ways| ways.first().map_or(0, |w| w.1)).collect();
+        let mut best: Vec<usize> =
+            found.ranked.iter().map(|ways| ways.first().map_or(0, |ranked| ranked.way)).collect();
         let mut needed = vec![usize::MAX; best.len()];
         // Ways are ranked by their charts, which are never more than those needed: the rest cannot be better then.
         let ways = found.ranked.iter().map(Vec::len).max().unwrap_or(0);
         for rank in 0..ways {
             let next = |component: usize| found.ranked[component].get(rank);
-            let is_open = |c: usize| found.ranked[c].len() > 1 && next(c).is_some_and(|w| w.0.charts < needed[c]);
+            let is_open = |c: usize| found.ranked[c].len() > 1 && next(c).is_some_and(|w| w.score.charts < needed[c]);
             let open: Vec<bool> = (0..best.len()).map(is_open).collect();
             if !open.contains(&true) {
                 break;
             }
-            let way = |c: usize| next(c).filter(|_| open[c]).map_or(best[c], |w| w.1);
+            let way = |c: usize| next(c).filter(|_| open[c]).map_or(best[c], |ranked| ranked.way);
             let tried: Vec<usize> = (0..best.len()).map(way).collect();
             let counts = self.needed(found, &tried, &open)?;
             for c in (0..best.len()).filter(|c| open[*c]) {
@@ -60,10 +61,9 @@ impl Choice<'_> {
         let labels = self.cells.of.iter().map(|c| charts.of[*c as usize]).collect();
         let mut network = Network::new(self.dual, labels, self.limits).keeping(RELAXED);
         self.dual.checkpoint()?;
-        relax(&mut network, 1.0, |label| open[component[label as usize]]);
-        self.dual.checkpoint()?;
+        relax(&mut network, 1.0, |label| open[component[label as usize]])?;
         let mut counts = vec![0; tried.len()];
-        for (component, verdict) in component.into_iter().zip(judge(&network, self.cells)) {
+        for (component, verdict) in component.into_iter().zip(judge(&network, self.cells)?) {
             counts[component] += self.parts(verdict);
         }
         Ok(counts)

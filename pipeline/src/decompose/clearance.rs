@@ -5,9 +5,8 @@
 //! where the domains of two of them meet that are far apart along the seams, the way across is a gap.
 
 use super::network::Network;
-use super::voronoi::At;
-use crate::topology::HalfEdgeId;
-use std::collections::BinaryHeap;
+use crate::monitor::Interrupted;
+use crate::topology::dijkstra::ShortestPaths;
 
 /// Two vertices of seams are far apart if the way along these is this many times the way across.
 const FAR: f64 = 3.0;
@@ -20,24 +19,25 @@ pub(super) struct Gaps {
     pub crossing: Vec<bool>,
 }
 
-pub(super) fn gaps(network: &Network) -> Gaps {
+pub(super) fn gaps(network: &Network) -> Result<Gaps, Interrupted> {
     let dual = network.dual;
     let places = places(network);
-    let (distance, owner) = domains(network, &places);
+    let domains = domains(network, &places)?;
     let mut clearance = vec![f64::INFINITY; places.len()];
     let mut crossing = vec![false; dual.mesh.edges().len()];
     for h in dual.half_edges() {
         let (u, v) = (dual.from(h), dual.to(h));
-        let (Some(a), Some(b)) = (owner[u], owner[v]) else { continue };
-        let gap = distance[u] + dual.length(h) + distance[v];
-        if a != b && along(&places[a as usize], &places[b as usize]) > FAR * gap {
+        let (Some(a), Some(b)) = (domains.label(u), domains.label(v)) else { continue };
+        let (Some(to_a), Some(to_b)) = (domains.distance(u), domains.distance(v)) else { continue };
+        let gap = to_a + dual.length(h) + to_b;
+        if a != b && along(&places[a], &places[b]) > FAR * gap {
             crossing[dual.mesh.edges().edge(h).index()] = true;
-            for o in [a as usize, b as usize] {
-                clearance[o] = clearance[o].min(gap);
+            for owner in [a, b] {
+                clearance[owner] = clearance[owner].min(gap);
             }
         }
     }
-    Gaps { clearance, crossing }
+    Ok(Gaps { clearance, crossing })
 }
 
 /// Where a vertex lies on the seams: the seam, the way to its begin and to its end, and whether it is closed.
@@ -86,30 +86,18 @@ fn along(a: &Place, b: &Place) -> f64 {
     }
 }
 
-/// Per vertex its distance from the nearest vertex on a seam or at the open boundary, and that vertex; as
-/// far as somebody waits for them.
-fn domains(network: &Network, places: &[Place]) -> (Vec<f64>, Vec<Option<u32>>) {
+/// Per vertex its distance from the nearest vertex on a seam or at the open boundary, and that vertex.
+fn domains(network: &Network, places: &[Place]) -> Result<ShortestPaths<usize>, Interrupted> {
     let dual = network.dual;
-    let (mut distance, mut owner) = (vec![f64::INFINITY; places.len()], vec![None; places.len()]);
-    let mut heap = BinaryHeap::new();
+    let mut paths = ShortestPaths::new(places.len(), usize::MAX);
     for v in (0..places.len()).filter(|v| places[*v] != Place::Inside) {
-        (distance[v], owner[v]) = (0.0, Some(v as u32));
-        heap.push(At { distance: 0.0, node: v as u32 });
+        paths.start(v, v);
     }
-    while let Some(At { distance: so_far, node }) = heap.pop() {
-        if so_far > distance[node as usize] {
-            continue;
-        }
-        if !dual.checkpoint.goes_on(1) {
-            break;
-        }
-        network.each_out(node as usize, |h: HalfEdgeId| {
-            let (to, length) = (dual.to(h), so_far + dual.length(h));
-            if length < distance[to] {
-                (distance[to], owner[to]) = (length, owner[node as usize]);
-                heap.push(At { distance: length, node: to as u32 });
-            }
+    while let Some(node) = paths.settle() {
+        dual.checkpoint.after(1)?;
+        network.each_out(node.index, |h| {
+            paths.reach(dual.to(h), node.distance + dual.length(h), node.label);
         });
     }
-    (distance, owner)
+    Ok(paths)
 }

@@ -10,6 +10,8 @@
 use super::dual::Dual;
 use super::voronoi::Cells;
 use crate::topology::HalfEdgeId;
+use crate::topology::loops::cut_at_corners;
+use crate::topology::partition::Partition;
 use crate::vec3::Vec3;
 
 /// No arc, no cell, no corner.
@@ -74,7 +76,7 @@ impl Complex {
         let mut doubled = vec![0_i64; cells.count];
         let mut counted = vec![false; dual.mesh.points().len()];
         tracer.boundary.iter().for_each(|h| counted[dual.from(*h)] = true);
-        tracer.boundary.iter().for_each(|h| doubled[tracer.cell(*h) as usize] += 1);
+        tracer.boundary.iter().for_each(|h| doubled[tracer.cells.label(*h) as usize] += 1);
         for (f, t) in dual.mesh.triangles().iter().enumerate() {
             let (area, normal, centroid) = (dual.area(f), dual.area_vector(f), dual.centroid(f));
             let fresh = t.iter().filter(|v| !std::mem::replace(&mut counted[v.index()], true)).count();
@@ -108,25 +110,25 @@ impl Complex {
 /// Finds the arcs.
 struct Tracer<'a> {
     dual: &'a Dual<'a>,
+    cells: Partition<'a, Dual<'a>>,
     of: &'a [u32],
     /// The half-edges around cells, ascending.
     boundary: Vec<HalfEdgeId>,
+    /// The loops that they form.
+    loops: Vec<Vec<HalfEdgeId>>,
     /// Per vertex, whether it is a corner.
     corner: Vec<bool>,
 }
 
 impl<'a> Tracer<'a> {
     fn new(dual: &'a Dual<'a>, cells: &'a Cells) -> Self {
-        let cell = |h: HalfEdgeId| cells.of[h.face().index()];
-        let is_boundary = |h: &HalfEdgeId| dual.across(*h).is_none_or(|t| cell(t) != cell(*h));
-        let boundary = dual.half_edges().filter(is_boundary).collect();
-        let mut made = Self { dual, of: &cells.of, boundary, corner: vec![false; dual.mesh.points().len()] };
+        let of = &cells.of[..];
+        let cells = Partition::new(dual, of);
+        let boundary = cells.boundary();
+        let loops = cells.loops(&boundary);
+        let mut made = Self { dual, cells, of, boundary, loops, corner: vec![false; dual.mesh.points().len()] };
         made.mark_corners();
         made
-    }
-
-    fn cell(&self, h: HalfEdgeId) -> u32 {
-        self.of[h.face().index()]
     }
 
     fn foes(&self, h: HalfEdgeId) -> Vec<u32> {
@@ -134,16 +136,6 @@ impl<'a> Tracer<'a> {
         cells.sort_unstable();
         cells.dedup();
         cells
-    }
-
-    /// The boundary half-edge after `h` around its cell: turns around the end of `h` until the cell ends, at the
-    /// latest at `h` itself.
-    fn next(&self, h: HalfEdgeId) -> HalfEdgeId {
-        let mut e = h.next();
-        while let Some(t) = self.dual.across(e).filter(|t| self.cell(*t) == self.cell(h)) {
-            e = t.next();
-        }
-        e
     }
 
     fn mark_corners(&mut self) {
@@ -155,56 +147,48 @@ impl<'a> Tracer<'a> {
                 (open[self.dual.from(*h)], open[self.dual.to(*h)]) = (true, true);
             }
         }
+        // Counted by half-edges, not by edges as in [`super::network`]: where triangles disagree about the orientation, an edge
+        // is an end of the surface to both, and its half-edges begin at the same vertex.
         for v in (0..vertices).filter(|v| out[*v] > 0) {
             self.corner[v] = out[v] != if open[v] { 1 } else { 2 };
         }
-        for h in self.boundary.iter().filter(|h| self.dual.across(**h).is_none()) {
-            let next = self.next(*h);
-            self.corner[self.dual.from(next)] |= self.foes(*h) != self.foes(next);
-        }
-        self.mark_loops();
-    }
-
-    /// Makes a corner on every loop that has none. Every half-edge is walked over once.
-    fn mark_loops(&mut self) {
-        let mut seen = vec![false; self.of.len() * 3];
-        for start in 0..self.boundary.len() {
-            let mut h = self.boundary[start];
-            let mut found = seen[h.index()];
-            while !std::mem::replace(&mut seen[h.index()], true) {
-                found |= self.corner[self.dual.from(h)];
-                h = self.next(h);
+        for boundary_loop in &self.loops {
+            let follower = boundary_loop.iter().cycle().skip(1);
+            for (h, next) in boundary_loop.iter().zip(follower) {
+                if self.dual.across(*h).is_none() && self.foes(*h) != self.foes(*next) {
+                    self.corner[self.dual.from(*next)] = true;
+                }
             }
-            self.corner[self.dual.from(h)] |= !found;
+        }
+        for boundary_loop in &self.loops {
+            if !boundary_loop.iter().any(|h| self.corner[self.dual.from(*h)]) {
+                self.corner[self.dual.from(boundary_loop[0])] = true;
+            }
         }
     }
 
     /// All half-arcs, their corners given as vertices.
     fn arcs(&self) -> Vec<HalfArc> {
-        let mut starts: Vec<(u32, HalfEdgeId)> =
-            self.boundary.iter().filter(|h| self.corner[self.dual.from(**h)]).map(|h| (self.cell(*h), *h)).collect();
-        starts.sort_unstable();
+        let begins_at_corner = |h: &HalfEdgeId| self.corner[self.dual.from(*h)];
+        let runs = self.loops.iter().flat_map(|l| cut_at_corners(l, begins_at_corner));
+        let mut runs: Vec<Vec<HalfEdgeId>> = runs.collect();
+        runs.sort_unstable_by_key(|run| (self.cells.label(run[0]), run[0]));
         let mut number = vec![NONE; self.of.len() * 3];
-        starts.iter().zip(0..).for_each(|((_, h), i)| number[h.index()] = i);
-        let mut arcs: Vec<HalfArc> = starts.iter().map(|(_, h)| self.arc(*h)).collect();
+        runs.iter().zip(0..).for_each(|(run, i)| number[run[0].index()] = i);
+        let mut arcs: Vec<HalfArc> = runs.iter().map(|run| self.arc(run)).collect();
         for arc in &mut arcs {
-            arc.next = number[self.next(arc.last).index()];
+            arc.next = number[self.cells.next(arc.last).index()];
             arc.twin = self.dual.across(arc.last).map_or(NONE, |t| number[t.index()]);
         }
         arcs
     }
 
-    /// The half-arc that begins with `first`: up to the next corner. Every loop has one, so it ends.
-    fn arc(&self, first: HalfEdgeId) -> HalfArc {
-        let mut run = vec![first];
-        let mut last = first;
-        while !self.corner[self.dual.to(last)] {
-            last = self.next(last);
-            run.push(last);
-        }
+    /// The half-arc along a run of half-edges, from one corner to the next.
+    fn arc(&self, run: &[HalfEdgeId]) -> HalfArc {
+        let (first, last) = (run[0], run[run.len() - 1]);
         let length = |h: &HalfEdgeId| self.dual.length(*h);
         HalfArc {
-            cell: self.cell(first),
+            cell: self.cells.label(first),
             from: self.dual.from(first) as u32,
             next: NONE,
             twin: NONE,

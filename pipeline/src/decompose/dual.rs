@@ -3,6 +3,8 @@
 use super::voronoi::Graph;
 use crate::mesh::SurfaceMesh;
 use crate::monitor::{Checkpoint, Interrupted, Monitor};
+use crate::topology::partition::Twins;
+use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 use crate::vec3::{Vec3, cross, distance, midpoint, sub};
 use std::collections::BTreeMap;
@@ -163,8 +165,26 @@ impl<'a> Dual<'a> {
         midpoint(self.points[self.from(h)], self.points[self.to(h)])
     }
 
+    /// The triangles, united with those neighbours with which they are `together`: told of the half-edge between them and its
+    /// other side.
+    pub(super) fn united(&self, together: impl Fn(HalfEdgeId, HalfEdgeId) -> bool) -> UnionFind {
+        let mut sets = UnionFind::new(self.centroids.len());
+        for h in self.half_edges() {
+            if let Some(twin) = self.across(h).filter(|twin| together(h, *twin)) {
+                sets.unite(h.face().index(), twin.face().index());
+            }
+        }
+        sets
+    }
+
     pub(super) fn half_edges(&self) -> impl Iterator<Item = HalfEdgeId> + use<> {
         (0..self.sides.len() as u32).map(HalfEdgeId)
+    }
+}
+
+impl Twins for Dual<'_> {
+    fn twin(&self, h: HalfEdgeId) -> Option<HalfEdgeId> {
+        self.across(h)
     }
 }
 

@@ -7,10 +7,8 @@
 use super::assemble::assemble;
 use super::legality::Illegal;
 use crate::atlas::Atlas;
-use crate::mesh::{SurfaceMesh, TriangleShape};
-use crate::topology::EdgeTable;
-use crate::topology::{FaceId, HalfEdgeId, VertexId};
-use crate::vec3::midpoint;
+use crate::mesh::{MeshEditor, SurfaceMesh};
+use crate::topology::{FaceId, HalfEdgeId};
 
 /// A surface whose ears are split.
 #[derive(Clone, Debug)]
@@ -29,20 +27,19 @@ pub struct WithoutEars {
 /// # Errors
 /// [`Illegal`]: a fault of planish.
 pub fn split_ears(mesh: &SurfaceMesh, atlas: &Atlas, max_triangles: usize) -> Result<Option<WithoutEars>, Illegal> {
-    let mut labels = vec![0; mesh.triangles().len()];
-    for chart in atlas.charts() {
-        chart.faces().iter().for_each(|f| labels[f.index()] = chart.id().0);
-    }
-    let sizes = atlas.charts().iter().map(|c| c.triangles().len()).collect();
-    let left_alone = vec![false; mesh.triangles().len()];
-    let fresh = mesh.welded.iter().max().map_or(0, |w| w + 1);
-    let mut work = Work { mesh: mesh.clone(), fresh, labels, sizes, max_triangles, left_alone, split: 0 };
+    let mut work = Work::new(mesh, atlas, max_triangles);
+    let mut mesh = mesh.clone();
     // A split ear is none any more, and its parts are none: every pass leaves fewer.
-    while work.pass() {}
+    let mut found = true;
+    while found {
+        let mut editor = MeshEditor::new(mesh);
+        found = work.pass(&mut editor);
+        mesh = editor.finish();
+    }
     if work.split == 0 {
         return Ok(None);
     }
-    let mut split = assemble(&work.mesh, &work.labels)?;
+    let mut split = assemble(&mesh, &work.labels)?;
     for (new, old) in split.charts.iter_mut().zip(atlas.charts()) {
         let on_outer = old.vertices[old.from(old.outer[0]).index()];
         let is_outer = |l: &Vec<HalfEdgeId>| l.iter().any(|h| new.vertices[new.from(*h).index()] == on_outer);
@@ -51,95 +48,88 @@ pub fn split_ears(mesh: &SurfaceMesh, atlas: &Atlas, max_triangles: usize) -> Re
         }
     }
     split.feature_edges = atlas.feature_edges;
-    Ok(Some(WithoutEars { mesh: work.mesh, atlas: split, split: work.split }))
+    Ok(Some(WithoutEars { mesh, atlas: split, split: work.split }))
 }
 
-/// A surface while its ears are split.
+/// An ear by the half-edge along which it is joined to its chart, and the other side of that.
+#[derive(Clone, Copy)]
+struct Ear {
+    inner: HalfEdgeId,
+    beyond: HalfEdgeId,
+}
+
+/// The charts while their ears are split.
 struct Work {
-    mesh: SurfaceMesh,
-    /// The number of the next vertex among the welded ones.
-    fresh: u32,
+    /// Per triangle its chart.
     labels: Vec<u32>,
     /// Per chart its triangles.
     sizes: Vec<usize>,
     max_triangles: usize,
+    /// Per triangle, whether it is an ear that cannot be split.
     left_alone: Vec<bool>,
     split: usize,
 }
 
 impl Work {
+    fn new(mesh: &SurfaceMesh, atlas: &Atlas, max_triangles: usize) -> Self {
+        let faces = mesh.triangles().len();
+        let mut labels = vec![0; faces];
+        for chart in atlas.charts() {
+            chart.faces().iter().for_each(|f| labels[f.index()] = chart.id().0);
+        }
+        let sizes = atlas.charts().iter().map(|c| c.triangles().len()).collect();
+        Self { labels, sizes, max_triangles, left_alone: vec![false; faces], split: 0 }
+    }
+
     /// Splits ears that share no triangle; whether there was one.
-    fn pass(&mut self) -> bool {
+    ///
+    /// Ears are looked for on the surface as it is being edited. A triangle beside one that was split just now may pass for an
+    /// ear there, as the sides of that one are numbered anew: then an edge more is split than need be.
+    fn pass(&mut self, editor: &mut MeshEditor) -> bool {
         let mut busy = vec![false; self.labels.len()];
         let mut found = false;
-        for face in (0..self.labels.len()).map(FaceId::at) {
-            let Some((inner, beyond)) = self.ear(face) else { continue };
-            if busy[face.index()] || busy[beyond.face().index()] || self.left_alone[face.index()] {
+        for face in (0..busy.len()).map(FaceId::at) {
+            let Some(ear) = self.ear(editor.unfinished(), face) else { continue };
+            let beyond = ear.beyond.face();
+            if busy[face.index()] || busy[beyond.index()] || self.left_alone[face.index()] {
                 continue;
             }
-            (busy[face.index()], busy[beyond.face().index()]) = (true, true);
+            (busy[face.index()], busy[beyond.index()]) = (true, true);
             found = true;
-            self.left_alone[face.index()] = !self.halve_edge(inner, beyond);
-        }
-        if found {
-            self.mesh.edges = EdgeTable::new(&self.mesh.triangles);
+            self.split(editor, ear);
         }
         found
     }
 
-    /// The half-edge along which an ear is joined to its chart, and its twin.
-    fn ear(&self, face: FaceId) -> Option<(HalfEdgeId, HalfEdgeId)> {
-        let inner = |h: HalfEdgeId| self.mesh.edges.twin(h).filter(|t| self.is_same_chart(h, *t)).map(|t| (h, t));
-        let mut all = (0..3).filter_map(|k| inner(HalfEdgeId::side_of(face, k)));
+    /// The triangle as an ear: joined to its chart along one side only.
+    fn ear(&self, mesh: &SurfaceMesh, face: FaceId) -> Option<Ear> {
+        let inside = |inner: HalfEdgeId| {
+            let beyond = mesh.edges().twin(inner).filter(|twin| self.is_same_chart(mesh, inner, *twin))?;
+            Some(Ear { inner, beyond })
+        };
+        let mut all = face.sides().into_iter().filter_map(inside);
         all.next().filter(|_| all.next().is_none())
     }
 
-    fn is_same_chart(&self, h: HalfEdgeId, t: HalfEdgeId) -> bool {
-        let from = |h: HalfEdgeId| self.mesh.triangles[h.face().index()][h.side()];
+    fn is_same_chart(&self, mesh: &SurfaceMesh, h: HalfEdgeId, t: HalfEdgeId) -> bool {
+        let from = |h: HalfEdgeId| mesh.triangles()[h.face().index()][h.side()];
         self.labels[h.face().index()] == self.labels[t.face().index()] && from(h) != from(t)
     }
 
-    /// Splits the edge along `h` and `t` in the middle, and the triangles at its sides; not where that gives a part
-    /// without area.
-    fn halve_edge(&mut self, h: HalfEdgeId, t: HalfEdgeId) -> bool {
-        let middle = VertexId::at(self.mesh.points.len());
-        let parts = [h, t].map(|side| self.halves(side, middle));
-        let size = self.sizes[self.labels[h.face().index()] as usize] + 2;
-        if size > self.max_triangles || parts.iter().flatten().any(|(_, shape)| shape.area() == 0.0) {
-            return false;
+    /// Splits an ear, or leaves it alone for good, where its chart would be too large or a part would have no area.
+    fn split(&mut self, editor: &mut MeshEditor, ear: Ear) {
+        let face = ear.inner.face().index();
+        let chart = self.labels[face];
+        let size = self.sizes[chart as usize] + 2;
+        if size > self.max_triangles || editor.split_edge([ear.inner, ear.beyond]).is_none() {
+            self.left_alone[face] = true;
+            return;
         }
-        self.sizes[self.labels[h.face().index()] as usize] = size;
-        let [p, q] = [h, h.next()].map(|e| self.mesh.triangles[e.face().index()][e.side()].index());
-        self.mesh.points.push(midpoint(self.mesh.points[p], self.mesh.points[q]));
-        self.mesh.welded.push(self.fresh);
-        self.fresh += 1;
-        for (side, [first, second]) in [h, t].into_iter().zip(parts) {
-            let face = side.face().index();
-            (self.mesh.triangles[face], self.mesh.metric.shapes[face]) = first;
-            self.mesh.triangles.push(second.0);
-            self.mesh.metric.shapes.push(second.1);
-            self.mesh.metric.flagged.push(self.mesh.metric.flagged[face]);
-            self.mesh.source.push(self.mesh.source[face]);
-            self.labels.push(self.labels[face]);
-            self.left_alone.push(false);
-        }
+        self.sizes[chart as usize] = size;
         self.split += 1;
-        true
-    }
-
-    /// The two parts of the triangle at `h` when `middle` halves that side.
-    fn halves(&self, h: HalfEdgeId, middle: VertexId) -> [([VertexId; 3], TriangleShape); 2] {
-        let (t, l) = (self.mesh.triangles[h.face().index()], self.mesh.metric.shapes[h.face().index()].lengths);
-        let k = h.side();
-        let [p, q, r] = [t[k], t[(k + 1) % 3], t[(k + 2) % 3]];
-        let [pq, qr, rp] = [l[k], l[(k + 1) % 3], l[(k + 2) % 3]];
-        // Apollonius: the median from r.
-        let median = (0.5 * (qr * qr + rp * rp) - 0.25 * pq * pq).max(0.0).sqrt();
-        let half = 0.5 * pq;
-        [
-            ([p, middle, r], TriangleShape { lengths: [half, median, rp] }),
-            ([middle, q, r], TriangleShape { lengths: [half, qr, median] }),
-        ]
+        // Two more triangles, at the end.
+        self.labels.extend([chart; 2]);
+        self.left_alone.extend([false; 2]);
     }
 }
 
@@ -169,6 +159,7 @@ mod tests {
             let atlas = decompose(&mesh, &Default::default(), &NoMonitor).expect("one chart");
             let done = split_ears(&mesh, &atlas, usize::MAX).expect("legal").expect("ears");
             assert_eq!((done.split, done.mesh.points().len()), (ears, mesh.points().len() + ears));
+            done.mesh.assert_sound();
             assert!((done.mesh.area() / mesh.area() - 1.0).abs() < 1e-14);
             let shapes = (0..done.mesh.triangles().len()).map(|f| done.mesh.metric().shapes[f].area());
             let scale = mesh.metric().scale;

@@ -12,6 +12,7 @@ use super::Settings;
 use super::dual::Dual;
 use crate::mesh::SurfaceMesh;
 use crate::monitor::{Interrupted, Monitor};
+use crate::topology::partition::Partition;
 use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId};
 use crate::vec3::{Vec3, dot, norm};
@@ -49,13 +50,15 @@ pub(super) fn with_features<'a>(
 ) -> Result<(Dual<'a>, usize), Interrupted> {
     let mut dual = Dual::new(mesh, monitor);
     dual.checkpoint()?;
-    let count = settings.feature_angle.map_or(0, |angle| mark_features(&mut dual, angle));
-    dual.checkpoint()?;
+    let count = match settings.feature_angle {
+        Some(angle) => mark_features(&mut dual, angle)?,
+        None => 0,
+    };
     Ok((dual, count))
 }
 
 /// Marks the feature edges of `dual`: dihedral angle above `angle` degrees. Returns their number.
-fn mark_features(dual: &mut Dual, angle: f64) -> usize {
+fn mark_features(dual: &mut Dual, angle: f64) -> Result<usize, Interrupted> {
     let cos = |degrees: f64| degrees.to_radians().cos();
     let (sharp, blunt) = (cos(angle), cos(LOWER * angle));
     let normals: Vec<Vec3> = (0..dual.mesh.triangles().len()).map(|f| dual.area_vector(f)).collect();
@@ -82,9 +85,12 @@ fn mark_features(dual: &mut Dual, angle: f64) -> usize {
     }
     let kept: Vec<HalfEdgeId> = kept.into_iter().map(|k| k.0).collect();
     // Every time some patches are united with others, so that fewer are left.
-    while dual.checkpoint().is_ok() && drop_small_patches(dual, &kept) {}
+    dual.checkpoint()?;
+    while drop_small_patches(dual, &kept) {
+        dual.checkpoint()?;
+    }
     drop_dangling(dual, &kept);
-    dual.sharpness.iter().filter(|s| **s > 0.0).count()
+    Ok(dual.sharpness.iter().filter(|s| **s > 0.0).count())
 }
 
 /// Unites each patch that is too small to be a face with the neighbour with which it shares most: the features between
@@ -120,11 +126,12 @@ fn small_patches(dual: &Dual, patch_of: &[u32], count: usize) -> Vec<bool> {
     for (f, patch) in patch_of.iter().enumerate() {
         areas[*patch as usize] += dual.area(f);
     }
-    let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
-    for h in dual.half_edges().filter(|h| dual.across(*h).is_none_or(|t| patch(t) != patch(*h))) {
-        let sharpness = if dual.across(h).is_none() { 1.0 } else { dual.sharpness(h) };
-        outlines[patch(h)] += dual.length(h);
-        weighed[patch(h)] += sharpness * dual.length(h);
+    let patches = Partition::new(dual, patch_of);
+    for h in patches.boundary() {
+        let patch = patches.label(h) as usize;
+        let sharpness = if patches.is_seam(h) { dual.sharpness(h) } else { 1.0 };
+        outlines[patch] += dual.length(h);
+        weighed[patch] += sharpness * dual.length(h);
     }
     let (least, width) = (least_outline(dual), LEAST_WIDTH * dual.total_area().sqrt());
     let is_bevel = |p: usize| 2.0 * areas[p] < width * outlines[p] && weighed[p] < BLUNT * outlines[p];
@@ -143,13 +150,7 @@ fn drop_dangling(dual: &mut Dual, features: &[HalfEdgeId]) {
 
 /// Per triangle the patch between features to which it belongs, and their number.
 fn patches(dual: &Dual) -> (Vec<u32>, usize) {
-    let mut sets = UnionFind::new(dual.mesh.triangles().len());
-    for h in dual.half_edges().filter(|h| !dual.is_feature(*h)) {
-        if let Some(t) = dual.across(h) {
-            sets.unite(h.face().index(), t.face().index());
-        }
-    }
-    sets.labels()
+    dual.united(|h, _| !dual.is_feature(h)).labels()
 }
 
 /// Whether two normals (of any length) differ by more than the angle with this cosine.

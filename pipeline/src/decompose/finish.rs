@@ -11,6 +11,7 @@ use super::straighten::{RELAXED, relax, round_off, straighten};
 use super::voronoi::Cells;
 use super::{Error, Settings};
 use crate::atlas::Atlas;
+use crate::monitor::Interrupted;
 use crate::topology::{EdgeId, HalfEdgeId};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -36,26 +37,23 @@ pub(super) fn finish(
     cells: &Cells,
     size: impl Fn(HalfEdgeId) -> f64,
 ) -> Result<Atlas, Error> {
-    let mut best = Judged::new(Network::new(dual, labels, limits), cells);
+    let mut best = Judged::new(Network::new(dual, labels, limits), cells)?;
     let bands = if best.network.seams().next().is_some() { &BANDS[..] } else { &[] };
     for (round, band) in bands.iter().enumerate() {
         dual.checkpoint()?;
-        let gaps = gaps(&best.network);
-        dual.checkpoint()?;
+        let gaps = gaps(&best.network)?;
         let clear = |h: HalfEdgeId| SHARE * gaps.clearance[dual.from(h)].min(gaps.clearance[dual.to(h)]);
         let breadth = |h: HalfEdgeId| clear(h).min(band * size(h));
         let step = Step { cells, largest: settings.max_area_ratio, gaps: &gaps, shrink: round == 0 };
-        let Err(bad) = best.step(&step, breadth) else { continue };
+        let StepOutcome::Undone { distorted } = best.step(&step, breadth)? else { continue };
         // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
         for part in [None].into_iter().chain((0..PARTS).map(Some)) {
-            dual.checkpoint()?;
-            let part_of = best.parts(&bad);
+            let part_of = best.parts(&distorted);
             let in_part = |h: HalfEdgeId| if part_of(h) == part { breadth(h) } else { 0.0 };
-            let _kept_or_left = best.step(&step, in_part);
+            best.step(&step, in_part)?;
         }
     }
-    let Judged { network, verdicts, .. } = best.unbent(cells);
-    dual.checkpoint()?;
+    let Judged { network, verdicts, .. } = best.unbent(cells)?;
     let mut atlas = assemble(dual.mesh, &network.labels)?;
     choose_outer(&mut atlas, &verdicts);
     Ok(atlas)
@@ -71,6 +69,14 @@ struct Step<'a> {
     shrink: bool,
 }
 
+/// What became of a step of straightening.
+enum StepOutcome {
+    /// The seams are straighter.
+    Made,
+    /// The seams are what they were: the charts of these labels would have been too distorted, or one was no chart.
+    Undone { distorted: Vec<u32> },
+}
+
 /// Per pair of charts the half-edges of all closed seams between them.
 type Loops = BTreeMap<[u32; 2], Vec<HalfEdgeId>>;
 
@@ -83,41 +89,46 @@ struct Judged<'a> {
 }
 
 impl<'a> Judged<'a> {
-    fn new(network: Network<'a>, cells: &Cells) -> Self {
-        let verdicts = judge(&network, cells);
-        Self { network, verdicts, held: BTreeSet::new() }
+    fn new(network: Network<'a>, cells: &Cells) -> Result<Self, Interrupted> {
+        let verdicts = judge(&network, cells)?;
+        Ok(Self { network, verdicts, held: BTreeSet::new() })
     }
 
     /// Straightens the seams as far as `breadth` allows, if no chart's ratio rises above the largest one by that;
-    /// otherwise all stays, and these charts are returned.
-    fn step(&mut self, step: &Step, breadth: impl Fn(HalfEdgeId) -> f64) -> Result<(), Vec<u32>> {
+    /// otherwise all stays.
+    fn step(&mut self, step: &Step, breadth: impl Fn(HalfEdgeId) -> f64) -> Result<StepOutcome, Interrupted> {
         let loops = self.loops();
-        let mut straight = self.straightened(step, &loops, &breadth);
+        let mut straight = self.straightened(step, &loops, &breadth)?;
         let known = self.held.len();
         if !step.shrink {
             self.held.extend(self.dearer(&loops, &straight));
         }
         if self.held.len() > known {
-            straight = self.straightened(step, &loops, &breadth);
+            straight = self.straightened(step, &loops, &breadth)?;
         }
         let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
         let worse = |(new, old): (&Option<Verdict>, &Option<Verdict>)| ratio(new) > step.largest.max(ratio(old));
         let pairs = straight.verdicts.iter().zip(&self.verdicts);
-        let bad: Vec<u32> = pairs.zip(0..).filter(|(pair, _)| worse(*pair)).map(|(_, label)| label).collect();
-        if bad.is_empty() && straight.network.is_sound() {
-            *self = Self { held: std::mem::take(&mut self.held), ..straight };
-            return Ok(());
+        let distorted: Vec<u32> = pairs.zip(0..).filter(|(pair, _)| worse(*pair)).map(|(_, label)| label).collect();
+        if !distorted.is_empty() || !straight.network.is_sound() {
+            return Ok(StepOutcome::Undone { distorted });
         }
-        Err(bad)
+        *self = Self { held: std::mem::take(&mut self.held), ..straight };
+        Ok(StepOutcome::Made)
     }
 
-    fn straightened(&self, step: &Step, loops: &Loops, breadth: impl Fn(HalfEdgeId) -> f64) -> Self {
+    fn straightened(
+        &self,
+        step: &Step,
+        loops: &Loops,
+        breadth: impl Fn(HalfEdgeId) -> f64,
+    ) -> Result<Self, Interrupted> {
         let edges = self.network.dual.mesh.edges();
         let held = loops.iter().filter(|l| self.held.contains(l.0)).flat_map(|l| l.1);
         let held: BTreeSet<EdgeId> = held.map(|h| edges.edge(*h)).collect();
         let mut network = self.network.clone().keeping(LEAST);
         let free = |h: HalfEdgeId| if held.contains(&edges.edge(h)) { 0.0 } else { breadth(h) };
-        straighten(&mut network, &step.gaps.crossing, free);
+        straighten(&mut network, &step.gaps.crossing, free)?;
         Self::new(network, step.cells)
     }
 
@@ -152,10 +163,12 @@ impl<'a> Judged<'a> {
 
     /// The same charts without bent seams, whatever becomes of the ratios: a chart that holds its ratio down by reaching
     /// around others in fingers had better be split across them.
-    fn unbent(self, cells: &Cells) -> Self {
+    fn unbent(self, cells: &Cells) -> Result<Self, Interrupted> {
         let mut network = self.network.clone().keeping(RELAXED);
-        let changed = relax(&mut network, BENT, |_| true) | round_off(&mut network);
-        if changed && network.is_sound() { Self::new(network, cells) } else { self }
+        let is_relaxed = relax(&mut network, BENT, |_| true)?;
+        let is_rounded = round_off(&mut network)?;
+        let changed = is_relaxed || is_rounded;
+        if changed && network.is_sound() { Self::new(network, cells) } else { Ok(self) }
     }
 
     /// Per half-edge on a seam of the charts `labels` its part, counted along the seam; none elsewhere.

@@ -6,10 +6,11 @@
 
 use super::complex::Complex;
 use super::network::Network;
-use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
+use super::predict::{CellGraph, WORK_PER_CELL, predict};
 use super::regions::Regions;
 use super::voronoi::Cells;
 use crate::atlas::Atlas;
+use crate::monitor::Interrupted;
 use crate::topology::HalfEdgeId;
 
 /// The prediction for a chart.
@@ -20,23 +21,26 @@ pub(super) struct Verdict {
     pub outer: HalfEdgeId,
 }
 
-/// The prediction for every label (none for labels without triangles, nor where nobody waits for it any more).
-pub(super) fn judge(network: &Network, cells: &Cells) -> Vec<Option<Verdict>> {
-    if network.dual.checkpoint().is_err() {
-        return vec![None; network.label_count()];
-    }
+/// The prediction for every label; none for labels without triangles.
+///
+/// # Errors
+/// [`Interrupted`].
+pub(super) fn judge(network: &Network, cells: &Cells) -> Result<Vec<Option<Verdict>>, Interrupted> {
+    network.dual.checkpoint()?;
     let (cut, labels) = cut(network, cells);
     let complex = Complex::new(network.dual, &cut);
     let graph = CellGraph::new(&complex);
     let mut regions = Regions::new(&complex, labels, network.label_count());
-    let verdict = |label: usize| {
-        let work = WORK_PER_CELL * regions.all[label].cells.len();
-        let outline = network.dual.checkpoint.goes_on(work).then(|| regions.outline_of(label as u32))?;
-        let (ratio, outer) = area_ratio(&complex, &graph, &regions.all[label].cells, &outline.loops);
-        let arc = *outline.loops.get(outer)?.first()?;
-        Some(Verdict { ratio, outer: complex.arcs[arc as usize].first })
-    };
-    (0..network.label_count()).map(verdict).collect()
+    let mut verdicts = Vec::with_capacity(network.label_count());
+    for label in 0..network.label_count() {
+        network.dual.checkpoint.after(WORK_PER_CELL * regions.all[label].cells.len())?;
+        let outline = regions.outline_of(label as u32);
+        let map = predict(&complex, &graph, &regions.all[label].cells, &outline.loops);
+        let first_arc = outline.loops.get(map.outer).and_then(|l| l.first());
+        let outer = first_arc.map(|arc| complex.arcs[*arc as usize].first);
+        verdicts.push(outer.map(|outer| Verdict { ratio: map.area_ratio, outer }));
+    }
+    Ok(verdicts)
 }
 
 /// The pieces into which labels cut the cells, and the label of each.

@@ -3,6 +3,8 @@
 
 use super::network::Network;
 use super::regions::Shape;
+use crate::topology::loops::walk_loops;
+use crate::topology::partition::Partition;
 use crate::topology::{FaceId, HalfEdgeId};
 
 /// A path along edges: half-edges from end to end, with the label that shall lie on its left and on its right.
@@ -149,28 +151,23 @@ impl Network<'_> {
         let (faces, inside) = (self.sizes[label as usize], self.inside[label as usize]);
         let euler = inside as i64 + (boundary.len() as i64 - faces as i64) / 2;
         let mut shape = Shape { faces, euler, loops: 0, seam_loops: 0, pinches: 0, meets_itself: false };
-        for start in boundary {
-            let mut h = *start;
-            let (mut fresh, mut seam) = (false, false);
-            while self.seen_half_edges.visit(h.index()) {
-                (fresh, seam) = (true, seam || self.dual.across(h).is_some());
-                shape.pinches += usize::from(!self.seen_vertices.visit(self.dual.from(h)));
-                shape.meets_itself |= self.dual.foes(h).iter().any(|f| self.labels[f.index()] == label);
-                h = self.next(h, label);
-            }
-            shape.loops += usize::from(fresh);
-            shape.seam_loops += usize::from(seam);
-        }
+        let (dual, labels) = (self.dual, &self.labels);
+        let partition = Partition::new(dual, labels);
+        let seen_vertices = &mut self.seen_vertices;
+        // Whether a seam was met on the loop at hand.
+        let mut has_seam = false;
+        let starts = boundary.iter().copied();
+        let next = |h| partition.next(h);
+        walk_loops(starts, &mut self.seen_half_edges, HalfEdgeId::index, next, |h, begins| {
+            has_seam &= !begins;
+            let meets_seam = !has_seam && dual.across(h).is_some();
+            has_seam |= meets_seam;
+            shape.loops += usize::from(begins);
+            shape.seam_loops += usize::from(meets_seam);
+            shape.pinches += usize::from(!seen_vertices.visit(dual.from(h)));
+            shape.meets_itself |= dual.foes(h).iter().any(|f| labels[f.index()] == label);
+        });
         shape
-    }
-
-    /// The half-edge after `h` along the boundary of a label.
-    fn next(&self, h: HalfEdgeId, label: u32) -> HalfEdgeId {
-        let mut e = h.next();
-        while let Some(t) = self.dual.across(e).filter(|t| self.label(*t) == label) {
-            e = t.next();
-        }
-        e
     }
 }
 
@@ -211,12 +208,11 @@ mod tests {
         let bounds =
             Bounds { goal: Goal::Vertex(target), labels: &labels, length: f64::INFINITY, band: &band, barred: &barred };
         let mut tree = Tree::new(network.dual);
-        tree.grow(network, root, &bounds);
-        if root == target || tree.distance(target).is_none() {
+        tree.grow(network, root, &bounds).expect("nobody interrupts");
+        let Some(half_edges) = tree.path(network.dual, target).filter(|path| !path.is_empty()) else {
             network.put_back(path);
             return None;
-        }
-        let half_edges = tree.path(network.dual, target);
+        };
         Some(network.lay(path, &[Path { half_edges, left, right }], &labels))
     }
 

@@ -1,5 +1,6 @@
 //! What a chart must be: connected, oriented, of genus 0, with simple boundary loops that share no vertex.
 
+use crate::topology::loops::boundary_loops;
 use crate::topology::{ChartId, EdgeId, HalfEdgeId, VertexId};
 use crate::topology::{EdgeTable, count_components};
 
@@ -42,11 +43,17 @@ pub enum Illegal {
     },
 }
 
-/// Decides whether `triangles` of `vertices` vertices, all of them in use, form a chart.
+/// Decides whether `triangles` of `vertices` vertices, all of them in use, form a chart. Returns its boundary loops, each
+/// from its least half-edge on, in the order of these.
 ///
 /// # Errors
 /// [`Illegal`], with the evidence.
-pub fn verify(chart: ChartId, triangles: &[[VertexId; 3]], edges: &EdgeTable, vertices: usize) -> Result<(), Illegal> {
+pub fn verify(
+    chart: ChartId,
+    triangles: &[[VertexId; 3]],
+    edges: &EdgeTable,
+    vertices: usize,
+) -> Result<Vec<Vec<HalfEdgeId>>, Illegal> {
     let from = |h: HalfEdgeId| triangles[h.face().index()][h.side()];
     let to = |h: HalfEdgeId| triangles[h.face().index()][h.next().side()];
     let sound = |sides: &[HalfEdgeId]| match *sides {
@@ -61,21 +68,17 @@ pub fn verify(chart: ChartId, triangles: &[[VertexId; 3]], edges: &EdgeTable, ve
     if parts != 1 {
         return Err(Illegal::Apart { chart, parts });
     }
-    let mut next: Vec<Option<VertexId>> = vec![None; vertices];
-    for h in edges.iter().filter(|(_, sides)| sides.len() == 1).map(|(_, sides)| sides[0]) {
-        if next[from(h).index()].replace(to(h)).is_some() {
-            return Err(Illegal::Pinched { chart, vertex: from(h) });
-        }
-    }
+    let pinched = |vertex: VertexId| Illegal::Pinched { chart, vertex };
+    let boundary_loops = boundary_loops(triangles, edges, vertices).map_err(pinched)?;
     if let Some(vertex) = touched(triangles, edges, vertices) {
-        return Err(Illegal::Pinched { chart, vertex });
+        return Err(pinched(vertex));
     }
-    let loops = cycles(&next);
+    let loops = boundary_loops.len();
     let euler = vertices as i64 - edges.len() as i64 + triangles.len() as i64;
     if loops == 0 || euler + loops as i64 != 2 {
         return Err(Illegal::Topology { chart, loops, euler });
     }
-    Ok(())
+    Ok(boundary_loops)
 }
 
 /// A vertex at which sheets touch that share no edge there: more umbrellas than the boundary half-edges out of it
@@ -84,18 +87,4 @@ fn touched(triangles: &[[VertexId; 3]], edges: &EdgeTable, vertices: usize) -> O
     let umbrellas = crate::topology::Umbrellas::new(triangles, edges);
     let mut seen = vec![false; vertices];
     umbrellas.vertices(triangles).into_iter().find(|v| std::mem::replace(&mut seen[v.index()], true))
-}
-
-/// The number of cycles of the boundary. Every step takes a vertex away, so it ends.
-fn cycles(next: &[Option<VertexId>]) -> usize {
-    let mut left = next.to_vec();
-    let mut count = 0;
-    for start in 0..left.len() {
-        let mut at = left[start].take();
-        count += usize::from(at.is_some());
-        while let Some(v) = at {
-            at = left[v.index()].take();
-        }
-    }
-    count
 }

@@ -1,7 +1,7 @@
 //! Growing charts: starting from a few dozen compact regions, the best pair of neighbours is united again and
 //! again, as long as unions are legal and not too distorted.
 
-use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
+use super::predict::{CellGraph, WORK_PER_CELL, predict};
 use super::regions::{Regions, Shape, Union};
 use crate::monitor::{Checkpoint, Interrupted};
 use crate::vec3::norm;
@@ -130,7 +130,7 @@ impl Merge<'_, '_> {
         let cells_of = |r: u32| self.regions.all[r as usize].cells.iter().copied();
         let cells: Vec<u32> = cells_of(a).chain(cells_of(b)).collect();
         let loops = &union.outline.loops;
-        let (ratio, _) = area_ratio(self.regions.complex, self.graph, &cells, loops);
+        let ratio = predict(self.regions.complex, self.graph, &cells, loops).area_ratio;
         let judged = Candidate { cost: self.cost((a, b), &union, ratio), ratio: Some(ratio), ..candidate };
         (ratio <= self.limits.area_ratio).then_some(judged)
     }

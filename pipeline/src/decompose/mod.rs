@@ -137,8 +137,7 @@ fn cells(dual: &Dual, limits: &Limits) -> Result<(Cells, Complex), Interrupted> 
     let cells = bisect_until(dual, cells, |cells| {
         complex = Complex::new(dual, cells);
         legal(dual, &complex, limits)
-    });
-    dual.checkpoint()?;
+    })?;
     Ok((cells, complex))
 }
 

@@ -4,6 +4,7 @@
 
 use super::dual::Dual;
 use super::merge::Limits;
+use crate::topology::partition::Partition;
 use crate::topology::union_find::UnionFind;
 use crate::topology::{HalfEdgeId, VisitStamps};
 
@@ -69,13 +70,10 @@ impl<'a> Network<'a> {
         }
         for h in dual.half_edges() {
             made.out[dual.from(h)] = h;
-            match dual.across(h) {
-                None => {}
-                Some(t) => {
-                    made.mark_seam(h, made.label(t) != made.label(h));
-                }
+            if made.partition().is_seam(h) {
+                made.mark_seam(h, true);
             }
-            if made.bounds(h, made.label(h)) {
+            if made.partition().is_boundary(h) {
                 let label = made.label(h) as usize;
                 made.boundaries[label].push(h);
             }
@@ -115,6 +113,11 @@ impl<'a> Network<'a> {
             let count = &mut self.inside[self.labels[self.out[vertex].face().index()] as usize];
             *count = count.wrapping_add_signed(by);
         }
+    }
+
+    /// The charts as they are now.
+    pub(super) fn partition(&self) -> Partition<'_, Dual<'a>> {
+        Partition::new(self.dual, &self.labels)
     }
 
     /// The label of the triangle that `h` bounds.
@@ -194,8 +197,8 @@ impl<'a> Network<'a> {
             if at == start || self.is_corner(at) || length >= limit {
                 return path;
             }
-            let back = self.dual.across(last);
-            let Some(next) = self.seams_at(at).into_iter().find(|s| Some(*s) != back) else { return path };
+            // Two seam edges meet here: the second one is what follows around the chart on the left.
+            let next = self.partition().next(last);
             length += self.dual.length(next);
             path.push(next);
         }
@@ -234,18 +237,13 @@ impl<'a> Network<'a> {
 
     /// Whether `h` bounds the chart `label`.
     pub(super) fn bounds(&self, h: HalfEdgeId, label: u32) -> bool {
-        self.label(h) == label && self.dual.across(h).is_none_or(|t| self.label(t) != label)
+        self.label(h) == label && self.partition().is_boundary(h)
     }
 
     /// Whether every chart is connected: the one thing that [`Self::lay`] takes on trust.
     pub(super) fn is_sound(&self) -> bool {
-        let mut sets = UnionFind::new(self.labels.len());
-        for h in self.dual.half_edges() {
-            if let Some(t) = self.dual.across(h).filter(|t| self.label(*t) == self.label(h)) {
-                sets.unite(h.face().index(), t.face().index());
-            }
-        }
-        sets.labels().1 == self.charts()
+        let mut parts = self.dual.united(|h, twin| self.label(twin) == self.label(h));
+        parts.labels().1 == self.charts()
     }
 }
 

@@ -176,10 +176,18 @@ struct System<'a> {
 /// Loops shorter than this share of the longest are never the outer one.
 const LONG: f64 = 0.5;
 
-/// The area ratio of a harmonic map of `cells`, whose union has these loops of half-arcs, and the best choice of the
-/// outer one among the long ones. At least 1, infinite where there is no map in doubles; 1 for a single cell, of which
-/// nothing can be told.
-pub(super) fn area_ratio(complex: &Complex, graph: &CellGraph, cells: &[u32], loops: &[Vec<u32>]) -> (f64, usize) {
+/// What a harmonic map of some cells would be like.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PredictedMap {
+    /// Its area ratio: at least 1, infinite where there is no map in doubles.
+    pub area_ratio: f64,
+    /// The loop that is the outer one.
+    pub outer: usize,
+}
+
+/// The harmonic map of `cells`, whose union has these loops of half-arcs, with the outer one among the long ones that gives
+/// the least area ratio. The ratio of a single cell, of which nothing can be told, is 1.
+pub(super) fn predict(complex: &Complex, graph: &CellGraph, cells: &[u32], loops: &[Vec<u32>]) -> PredictedMap {
     let length = |l: &Vec<u32>| l.iter().map(|a| complex.arcs[*a as usize].length).sum::<f64>();
     let lengths: Vec<f64> = loops.iter().map(length).collect();
     let longest = lengths.iter().fold(0.0, |m, l| f64::max(m, *l));
@@ -196,10 +204,17 @@ pub(super) fn area_ratio(complex: &Complex, graph: &CellGraph, cells: &[u32], lo
     };
     let mut long = (0..loops.len()).filter(|i| lengths[*i] >= LONG * longest);
     if dofs.count() == 1 {
-        return (1.0, long.next().unwrap_or(0));
+        return PredictedMap { area_ratio: 1.0, outer: long.next().unwrap_or(0) };
     }
-    let all = long.map(|outer| (with_outer(outer), outer));
-    all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).unwrap_or((f64::INFINITY, 0))
+    let mut best = PredictedMap { area_ratio: f64::INFINITY, outer: long.clone().next().unwrap_or(0) };
+    for outer in long {
+        let area_ratio = with_outer(outer);
+        // Of loops that are as good, the first one.
+        if area_ratio.total_cmp(&best.area_ratio).is_lt() {
+            best = PredictedMap { area_ratio, outer };
+        }
+    }
+    best
 }
 
 impl<'a> System<'a> {

@@ -6,6 +6,7 @@
 
 use super::complex::{Complex, NONE};
 use crate::topology::VisitStamps;
+use crate::topology::loops::{next_on_boundary, walk_loops};
 use crate::vec3::Vec3;
 
 /// What is known of a region.
@@ -135,46 +136,35 @@ impl<'a> Regions<'a> {
         self.seen_arcs.clear();
         self.seen_corners.clear();
         let mut outline = Outline::default();
-        for start in boundary {
-            let mut turn = Vec::new();
-            let mut arc = *start;
-            // The next boundary half-arc is unique, and so is the one before: the walk closes where it began.
-            while self.seen_arcs.visit(arc as usize) {
-                turn.push(arc);
-                let half = &self.complex.arcs[arc as usize];
-                outline.pinches += usize::from(!self.seen_corners.visit(half.from as usize));
-                outline.meets_itself |= half.foes.iter().any(|f| [a, b].contains(&self.of_cell[*f as usize]));
-                arc = self.next(a, b, arc);
-            }
-            if !turn.is_empty() {
-                outline.loops.push(turn);
-            }
-        }
+        let union = CellsOf { complex: self.complex, of_cell: &self.of_cell, regions: [a, b] };
+        let seen_corners = &mut self.seen_corners;
+        let starts = boundary.iter().copied();
+        walk_loops(
+            starts,
+            &mut self.seen_arcs,
+            |arc| arc as usize,
+            |arc| union.next(arc),
+            |arc, begins| {
+                let half = &union.complex.arcs[arc as usize];
+                outline.pinches += usize::from(!seen_corners.visit(half.from as usize));
+                outline.meets_itself |= half.foes.iter().any(|cell| union.has(*cell));
+                match outline.loops.last_mut() {
+                    Some(open) if !begins => open.push(arc),
+                    _ => outline.loops.push(vec![arc]),
+                }
+            },
+        );
         outline
-    }
-
-    /// The other side of a half-arc, if it belongs to `a` or `b`.
-    fn inner_twin(&self, a: u32, b: u32, arc: u32) -> Option<u32> {
-        self.twin(arc).filter(|t| [a, b].contains(&self.of(*t)))
-    }
-
-    /// The boundary half-arc of the union of `a` and `b` after `arc`: turns around its end until the union ends. It
-    /// does end, at the latest at `arc` itself.
-    fn next(&self, a: u32, b: u32, arc: u32) -> u32 {
-        let mut e = self.complex.arcs[arc as usize].next;
-        while let Some(t) = self.inner_twin(a, b, e) {
-            e = self.complex.arcs[t as usize].next;
-        }
-        e
     }
 
     /// Whether the end of `arc`, which runs between `a` and `b`, comes to lie inside the union, and `arc` is the least
     /// half-arc of `a` that runs to it along `b`.
     fn closes_corner(&self, a: u32, b: u32, arc: u32) -> bool {
+        let union = CellsOf { complex: self.complex, of_cell: &self.of_cell, regions: [a, b] };
         let first = self.complex.arcs[arc as usize].next;
         let mut e = first;
         loop {
-            let Some(t) = self.inner_twin(a, b, e) else { return false };
+            let Some(t) = union.inner_twin(e) else { return false };
             // t runs to the corner.
             if self.of(t) == a && self.of(e) == b && t < arc {
                 return false;
@@ -239,6 +229,30 @@ impl<'a> Regions<'a> {
             pinches: outline.pinches,
             meets_itself: outline.meets_itself,
         }
+    }
+}
+
+/// The cells of two regions, or of one that is named twice.
+struct CellsOf<'a> {
+    complex: &'a Complex,
+    of_cell: &'a [u32],
+    regions: [u32; 2],
+}
+
+impl CellsOf<'_> {
+    fn has(&self, cell: u32) -> bool {
+        self.regions.contains(&self.of_cell[cell as usize])
+    }
+
+    /// The other side of a half-arc, if it belongs to the regions.
+    fn inner_twin(&self, arc: u32) -> Option<u32> {
+        let twin = Some(self.complex.arcs[arc as usize].twin).filter(|twin| *twin != NONE);
+        twin.filter(|twin| self.has(self.complex.arcs[*twin as usize].cell))
+    }
+
+    /// The boundary half-arc that follows the one given.
+    fn next(&self, arc: u32) -> u32 {
+        next_on_boundary(arc, |side| self.complex.arcs[side as usize].next, |side| self.inner_twin(side))
     }
 }
 

@@ -6,8 +6,8 @@
 
 use super::complex::{Complex, NONE};
 use super::merge::{Limits, Merge, Weights};
-use super::predict::{CellGraph, WORK_PER_CELL, area_ratio};
-use super::regions::{Outline, Region, Regions};
+use super::predict::{CellGraph, WORK_PER_CELL, predict};
+use super::regions::{Region, Regions};
 use super::sides::{Axes, axes, faces};
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use crate::monitor::{Checkpoint, Interrupted};
@@ -65,12 +65,20 @@ pub(super) struct Score {
     beauty: f64,
 }
 
+/// A way in which a component was grown, and what became of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ranked {
+    pub score: Score,
+    /// Which way: its place among the results.
+    pub way: usize,
+}
+
 /// What the search found.
 pub(super) struct Found {
     /// The components of the cells.
     pub components: Cells,
     /// Per component the ways that lead to charts, the best first.
-    pub ranked: Vec<Vec<(Score, usize)>>,
+    pub ranked: Vec<Vec<Ranked>>,
     /// Per way, for each cell its chart.
     ways: Vec<Vec<u32>>,
 }
@@ -92,34 +100,41 @@ impl Search<'_> {
     pub(super) fn run(&self) -> Result<Found, Interrupted> {
         let components = farthest_first(self.graph, |_| 1);
         let whole = Regions::new(self.complex, components.of.clone(), components.count);
-        let whole = self.fine(whole, WHOLE * self.bound);
+        let whole = self.fine(whole, WHOLE * self.bound)?;
         let mut ways = vec![components.of.clone()];
-        let left_whole = |w: &bool| if *w { vec![(Score { charts: 1, beauty: 0.0 }, 0)] } else { vec![] };
-        let mut ranked: Vec<Vec<(Score, usize)>> = whole.iter().map(left_whole).collect();
+        let left_whole =
+            |w: &bool| if *w { vec![Ranked { score: Score { charts: 1, beauty: 0.0 }, way: 0 }] } else { vec![] };
+        let mut ranked: Vec<Vec<Ranked>> = whole.iter().map(left_whole).collect();
         let axes = axes(self.complex, &components);
         for way in WAYS.iter().filter(|_| whole.contains(&false)) {
             let (of, scores) = self.grow(way, &components, &axes, &whole)?;
-            for (ranked, score) in ranked.iter_mut().zip(scores).zip(&whole).filter(|(_, w)| !**w).map(|(r, _)| r) {
-                ranked.push((score, ways.len()));
+            for (component, score) in scores.into_iter().enumerate() {
+                if !whole[component] {
+                    ranked[component].push(Ranked { score, way: ways.len() });
+                }
             }
             ways.push(of);
         }
-        let order = |a: &(Score, usize), b: &(Score, usize)| {
-            a.0.charts.cmp(&b.0.charts).then(a.0.beauty.total_cmp(&b.0.beauty)).then(a.1.cmp(&b.1))
+        let order = |a: &Ranked, b: &Ranked| {
+            let by_charts = a.score.charts.cmp(&b.score.charts);
+            by_charts.then(a.score.beauty.total_cmp(&b.score.beauty)).then(a.way.cmp(&b.way))
         };
         ranked.iter_mut().for_each(|r| r.sort_by(order));
         Ok(Found { components, ranked, ways })
     }
 
-    /// Per region, whether it may be a chart with at most this area ratio; all, where nobody waits for it any more.
-    fn fine(&self, mut regions: Regions, largest: f64) -> Vec<bool> {
-        let outlines: Vec<_> = (0..regions.all.len() as u32).map(|r| regions.outline_of(r)).collect();
-        let judge = |(region, outline): (&Region, &Outline)| {
-            let ratio = || area_ratio(self.complex, self.graph, &region.cells, &outline.loops).0;
-            let allowed = || self.limits.allow(&regions.shape(region, outline)) && ratio() <= largest;
-            !self.checkpoint.goes_on(WORK_PER_CELL * region.cells.len()) || allowed()
-        };
-        regions.all.iter().zip(&outlines).map(judge).collect()
+    /// Per region, whether it may be a chart with at most this area ratio.
+    fn fine(&self, mut regions: Regions, largest: f64) -> Result<Vec<bool>, Interrupted> {
+        let mut fine = Vec::with_capacity(regions.all.len());
+        for label in 0..regions.all.len() {
+            let outline = regions.outline_of(label as u32);
+            let region = &regions.all[label];
+            self.checkpoint.after(WORK_PER_CELL * region.cells.len())?;
+            let is_allowed = self.limits.allow(&regions.shape(region, &outline));
+            let ratio = || predict(self.complex, self.graph, &region.cells, &outline.loops).area_ratio;
+            fine.push(is_allowed && ratio() <= largest);
+        }
+        Ok(fine)
     }
 
     /// Grows charts one way: per cell its chart, and the score of every component.
@@ -134,7 +149,7 @@ impl Search<'_> {
         let groups = farthest_first(self.graph, |part| if is_whole(part[0]) { 1 } else { way.regions });
         let groups = bisect_until(self.graph, groups, |groups| {
             self.fine(Regions::new(self.complex, groups.of.clone(), groups.count), self.limits.area_ratio)
-        });
+        })?;
         let mut regions = Regions::new(self.complex, groups.of, groups.count);
         let component = |r: &Region| r.cells.first().map_or(0, |c| components.of[*c as usize]);
         let side = |axis: usize| {

@@ -2,10 +2,10 @@
 
 use super::dual::Dual;
 use super::network::Network;
-use super::voronoi::At;
+use crate::monitor::Interrupted;
 use crate::topology::HalfEdgeId;
+use crate::topology::dijkstra::{Settled, ShortestPaths};
 use crate::vec3::distance;
-use std::collections::BinaryHeap;
 
 /// An edge along a feature is as long as this share of it.
 const FEATURE: f64 = 0.25;
@@ -25,20 +25,11 @@ pub(super) fn reversed(dual: &Dual, path: &[HalfEdgeId]) -> Vec<HalfEdgeId> {
     path.iter().rev().filter_map(|h| dual.across(*h)).collect()
 }
 
-/// What the search knows of a vertex.
-#[derive(Clone, Copy)]
-struct Reached {
-    stamp: u32,
-    via: HalfEdgeId,
-    distance: f64,
-}
-
 /// A tree of shortest paths, of vertices that were reached.
 pub(super) struct Tree {
     from: usize,
-    now: u32,
-    known: Vec<Reached>,
-    heap: BinaryHeap<At>,
+    /// Every vertex has for a label the half-edge along which it was reached.
+    paths: ShortestPaths<HalfEdgeId>,
     /// The straight distance times this never exceeds the length of a path.
     floor: f64,
     /// The vertices in the order in which they were settled.
@@ -72,12 +63,9 @@ pub(super) struct Bounds<'a> {
 
 impl Tree {
     pub(super) fn new(dual: &Dual) -> Self {
-        let unknown = Reached { stamp: 0, via: HalfEdgeId(0), distance: 0.0 };
         Self {
             from: 0,
-            now: 0,
-            known: vec![unknown; dual.mesh.points().len()],
-            heap: BinaryHeap::new(),
+            paths: ShortestPaths::new(dual.mesh.points().len(), HalfEdgeId(0)),
             floor: if dual.sharpness.iter().any(|s| *s > 0.0) { FEATURE } else { 1.0 },
             settled: Vec::new(),
         }
@@ -85,94 +73,69 @@ impl Tree {
 
     /// The distance of a vertex, if it was reached.
     pub(super) fn distance(&self, vertex: usize) -> Option<f64> {
-        let known = &self.known[vertex];
-        (known.stamp == self.now).then_some(known.distance)
+        self.paths.distance(vertex)
     }
 
-    /// The path from the root to a vertex that was reached.
-    pub(super) fn path(&self, dual: &Dual, vertex: usize) -> Vec<HalfEdgeId> {
+    /// The path from the root to a vertex; none where that was not reached.
+    pub(super) fn path(&self, dual: &Dual, vertex: usize) -> Option<Vec<HalfEdgeId>> {
         let mut path = Vec::new();
         let mut at = vertex;
         while at != self.from {
-            path.push(self.known[at].via);
-            at = dual.from(self.known[at].via);
+            let via = self.paths.label(at)?;
+            path.push(via);
+            at = dual.from(via);
         }
         path.reverse();
-        path
+        Some(path)
     }
 
-    /// Grows the tree from `from`: Dijkstra, and on the way to one vertex ordered by the distance with what is left at
-    /// least (A*: Hart, Nilsson and Raphael 1968, doi 10.1109/TSSC.1968.300136). Ends because distances only fall,
-    /// and early where nobody waits for paths any more.
-    pub(super) fn grow(&mut self, network: &Network, from: usize, bounds: &Bounds) {
-        let ahead = |tree: &Self, v: usize| match bounds.goal {
-            Goal::Vertex(_) => tree.left(network.dual, bounds, v),
-            _ => 0.0,
+    /// Grows the tree from `from`, on the way to one vertex by A*.
+    ///
+    /// # Errors
+    /// [`Interrupted`]: the tree is none then.
+    pub(super) fn grow(&mut self, network: &Network, from: usize, bounds: &Bounds) -> Result<(), Interrupted> {
+        let floor = self.floor;
+        let ahead = |vertex: usize| match bounds.goal {
+            Goal::Vertex(_) => bounds.left(network.dual, floor, vertex),
+            Goal::OpenLoop(_) | Goal::Meeting(_) => 0.0,
         };
-        self.start(from);
-        let mut limit = bounds.length;
-        while let Some(At { distance: sum, node }) = self.heap.pop() {
-            let node = node as usize;
-            let so_far = self.known[node].distance;
-            if sum > so_far + ahead(self, node) {
-                continue;
-            }
-            if !network.dual.checkpoint.goes_on(1) {
-                return;
-            }
-            self.settled.push(node);
-            if node != from && bounds.goal.is_at(network, node) {
-                return;
-            }
-            if node == from || !network.is_open(node) {
-                limit = limit.min(bounds.goal.total(node, so_far));
-                self.spread(network, node, &Bounds { length: limit, ..*bounds }, ahead);
-            }
-        }
-    }
-
-    fn start(&mut self, from: usize) {
-        self.now += 1;
         self.from = from;
         self.settled.clear();
-        self.heap.clear();
-        self.heap.push(At { distance: 0.0, node: from as u32 });
-        self.known[from] = Reached { stamp: self.now, via: HalfEdgeId(0), distance: 0.0 };
-    }
-
-    /// Reaches the neighbours of `node`.
-    fn spread(&mut self, network: &Network, node: usize, bounds: &Bounds, ahead: impl Fn(&Self, usize) -> f64) {
-        let dual = network.dual;
-        let plain = self.floor == 1.0;
-        let so_far = self.known[node].distance;
-        network.each_out(node, |h| {
-            let to = dual.to(h);
-            let distance = so_far + if plain { dual.length(h) } else { weight(dual, h) };
-            let known = &self.known[to];
-            let reached = known.stamp == self.now && known.distance <= distance;
-            if reached || !bounds.admit(network, h, to, node == self.from) {
-                return;
+        self.paths.clear();
+        self.paths.start(from, HalfEdgeId(0));
+        let mut limit = bounds.length;
+        while let Some(node) = self.paths.settle_towards(ahead) {
+            network.dual.checkpoint.after(1)?;
+            self.settled.push(node.index);
+            if node.index != from && bounds.goal.is_at(network, node.index) {
+                break;
             }
-            if distance + self.left(dual, bounds, to) <= bounds.length {
-                self.known[to] = Reached { stamp: self.now, via: h, distance };
-                self.heap.push(At { distance: distance + ahead(self, to), node: to as u32 });
-            }
-        });
-    }
-
-    /// What a path through `vertex` still needs at least. Three points are not joined by less than straight lines from
-    /// their Fermat point, nor by less than half the circumference of their triangle, along paths that are known.
-    fn left(&self, dual: &Dual, bounds: &Bounds, vertex: usize) -> f64 {
-        let straight = |a: usize, b: usize| self.floor * distance(dual.point(a), dual.point(b));
-        match bounds.goal {
-            Goal::Vertex(v) => straight(vertex, v),
-            Goal::OpenLoop(_) => 0.0,
-            Goal::Meeting([(a, to_a), (b, to_b)]) => {
-                let [va, vb, ab] = [straight(vertex, a), straight(vertex, b), straight(a, b)];
-                let known = |tree: Option<&Tree>, way: f64| tree.and_then(|t| t.distance(vertex)).unwrap_or(way);
-                joined([va, vb, ab]).max(0.5 * (known(to_a, va) + known(to_b, vb) + ab))
+            if node.index == from || !network.is_open(node.index) {
+                limit = limit.min(bounds.goal.total(node.index, node.distance));
+                self.spread(network, &node, &Bounds { length: limit, ..*bounds }, ahead);
             }
         }
+        Ok(())
+    }
+
+    /// Reaches the neighbours of a vertex.
+    fn spread(&mut self, network: &Network, node: &Settled<HalfEdgeId>, bounds: &Bounds, ahead: impl Fn(usize) -> f64) {
+        let dual = network.dual;
+        let (from, floor) = (self.from, self.floor);
+        let has_no_features = floor == 1.0;
+        let paths = &mut self.paths;
+        network.each_out(node.index, |h| {
+            let to = dual.to(h);
+            let step = if has_no_features { dual.length(h) } else { weight(dual, h) };
+            let distance = node.distance + step;
+            let is_near = paths.distance(to).is_some_and(|known| known <= distance);
+            if is_near || !bounds.admit(network, h, to, node.index == from) {
+                return;
+            }
+            if distance + bounds.left(dual, floor, to) <= bounds.length {
+                paths.reach_towards(to, distance, h, ahead(to));
+            }
+        });
     }
 }
 
@@ -207,6 +170,22 @@ impl Goal<'_> {
 }
 
 impl Bounds<'_> {
+    /// What a path through `vertex` still needs at least, where `floor` times a straight distance never exceeds the length of
+    /// a path. Three points are not joined by less than straight lines from their Fermat point, nor by less than half the
+    /// circumference of their triangle, along paths that are known.
+    fn left(&self, dual: &Dual, floor: f64, vertex: usize) -> f64 {
+        let straight = |a: usize, b: usize| floor * distance(dual.point(a), dual.point(b));
+        match self.goal {
+            Goal::Vertex(v) => straight(vertex, v),
+            Goal::OpenLoop(_) => 0.0,
+            Goal::Meeting([(a, to_a), (b, to_b)]) => {
+                let [va, vb, ab] = [straight(vertex, a), straight(vertex, b), straight(a, b)];
+                let known = |tree: Option<&Tree>, way: f64| tree.and_then(|t| t.distance(vertex)).unwrap_or(way);
+                joined([va, vb, ab]).max(0.5 * (known(to_a, va) + known(to_b, vb) + ab))
+            }
+        }
+    }
+
     /// Whether a path may go along `h` to the vertex `to`. Around a vertex that no seam touches nothing but the given
     /// charts is found: so labels are only asked for at the root.
     fn admit(&self, network: &Network, h: HalfEdgeId, to: usize, at_root: bool) -> bool {
@@ -246,9 +225,11 @@ mod tests {
         let [mut first, mut second, mut third] = [0; 3].map(|_| Tree::new(network.dual));
         let barred = vec![false; network.dual.mesh.edges().len()];
         let bounds = |a, b| Bounds { goal: Goal::Meeting([a, b]), labels: &[0], length, band: &band, barred: &barred };
-        first.grow(network, ends[0], &bounds((ends[1], None), (ends[2], None)));
-        second.grow(network, ends[1], &bounds((ends[0], Some(&first)), (ends[2], None)));
-        third.grow(network, ends[2], &bounds((ends[0], Some(&first)), (ends[1], Some(&second))));
+        first.grow(network, ends[0], &bounds((ends[1], None), (ends[2], None))).expect("nobody interrupts");
+        second.grow(network, ends[1], &bounds((ends[0], Some(&first)), (ends[2], None))).expect("nobody interrupts");
+        third
+            .grow(network, ends[2], &bounds((ends[0], Some(&first)), (ends[1], Some(&second))))
+            .expect("nobody interrupts");
         let sum = |v: &usize| Some(first.distance(*v)? + second.distance(*v)? + third.distance(*v)?);
         let inner = third.settled.iter().filter(|v| !ends.contains(v));
         inner.filter_map(sum).fold(f64::INFINITY, f64::min)
@@ -281,10 +262,10 @@ mod tests {
         let barred = vec![false; dual.mesh.edges().len()];
         let bounds = |goal| Bounds { goal, labels: &[0], length: f64::INFINITY, band: &band, barred: &barred };
         let inner: Vec<usize> = (0..mesh.points().len()).filter(|v| !network.is_open(*v)).collect();
-        all.grow(&network, inner[0], &bounds(Goal::Meeting([(inner[0], None); 2])));
+        all.grow(&network, inner[0], &bounds(Goal::Meeting([(inner[0], None); 2]))).expect("nobody interrupts");
         for target in inner.iter().skip(1).step_by(7) {
-            one.grow(&network, inner[0], &bounds(Goal::Vertex(*target)));
-            let path = one.path(&dual, *target);
+            one.grow(&network, inner[0], &bounds(Goal::Vertex(*target))).expect("nobody interrupts");
+            let path = one.path(&dual, *target).expect("reached");
             assert!((length(&dual, &path) - one.distance(*target).expect("reached")).abs() < 1e-12);
             assert!((one.distance(*target).expect("reached") - all.distance(*target).expect("reached")).abs() < 1e-12);
         }

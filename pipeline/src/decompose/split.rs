@@ -12,8 +12,8 @@ use super::regions::Regions;
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
-use crate::monitor::Monitor;
-use crate::topology::union_find::UnionFind;
+use crate::monitor::{Interrupted, Monitor};
+use crate::topology::partition::Partition;
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
 /// Where to cut, as shares of the range of the logarithm of the area scale: the middle first.
@@ -37,8 +37,11 @@ pub fn split(
         return Ok(None);
     }
     let cut = |dual: &Dual, limits: &Limits| {
-        let by_scale = log_scale.and_then(|s| across_protrusion(dual, s, limits));
-        by_scale.unwrap_or_else(|| halves(dual, limits))
+        let by_scale = match log_scale {
+            Some(log_scale) => across_protrusion(dual, log_scale, limits)?,
+            None => None,
+        };
+        by_scale.map_or_else(|| halves(dual, limits), Ok)
     };
     pieces(chart, cut, settings, monitor).map(Some)
 }
@@ -75,7 +78,8 @@ pub fn halve(chart: &Chart, is_left: &[bool], settings: &Settings, monitor: &dyn
 /// Per triangle 0 or 1, the side of the largest connected part of one side that is the fewest triangles away.
 fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
     let count = is_left.len();
-    let mut parts = joined(dual, |f, g| is_left[f] == is_left[g]);
+    let side = |h: HalfEdgeId| is_left[h.face().index()];
+    let mut parts = dual.united(|h, twin| side(h) == side(twin));
     let roots: Vec<usize> = (0..count).map(|f| parts.find(f)).collect();
     let mut sizes = vec![0; count];
     roots.iter().for_each(|r| sizes[*r] += 1);
@@ -102,14 +106,14 @@ pub fn contact(chart: &Chart) -> Option<[VertexId; 2]> {
 /// The charts into which `cut` labels the triangles of `chart`, with straightened seams.
 fn pieces(
     chart: &Chart,
-    cut: impl FnOnce(&Dual, &Limits) -> Vec<u32>,
+    cut: impl FnOnce(&Dual, &Limits) -> Result<Vec<u32>, Interrupted>,
     settings: &Settings,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Chart>, Error> {
     let part = chart.to_surface();
     let (dual, _) = with_features(&part, settings, monitor)?;
     let limits = Limits::new(settings);
-    let labels = cut(&dual, &limits);
+    let labels = cut(&dual, &limits)?;
     let (cells, _) = cells(&dual, &limits)?;
     let size = dual.total_area() / cells.count as f64;
     let pieces = finish(&dual, labels, limits, settings, &cells, |_| size.sqrt())?;
@@ -158,46 +162,48 @@ fn grow(dual: &Dual, mut labels: Vec<u32>, mut front: Vec<FaceId>) -> Vec<u32> {
 }
 
 /// Two parts of about the same size; more where these are no charts.
-fn halves(dual: &Dual, limits: &Limits) -> Vec<u32> {
+fn halves(dual: &Dual, limits: &Limits) -> Result<Vec<u32>, Interrupted> {
     bisected(dual, farthest_first(dual, |_| 2), limits)
 }
 
 /// The labels of cells that are bisected until all are charts.
-fn bisected(dual: &Dual, cells: Cells, limits: &Limits) -> Vec<u32> {
-    bisect_until(dual, cells, |groups| legal(dual, &Complex::new(dual, groups), limits)).of
+fn bisected(dual: &Dual, cells: Cells, limits: &Limits) -> Result<Vec<u32>, Interrupted> {
+    let cells = bisect_until(dual, cells, |groups| legal(dual, &Complex::new(dual, groups), limits))?;
+    Ok(cells.of)
 }
 
-/// Per cell, whether it may be a chart. A safe point: all may be where nobody waits for charts any more.
-pub(super) fn legal(dual: &Dual, complex: &Complex, limits: &Limits) -> Vec<bool> {
+/// Per cell, whether it may be a chart. A safe point.
+pub(super) fn legal(dual: &Dual, complex: &Complex, limits: &Limits) -> Result<Vec<bool>, Interrupted> {
+    dual.checkpoint()?;
     let count = complex.cells.len();
-    if dual.checkpoint().is_err() {
-        return vec![true; count];
-    }
     let mut regions = Regions::new(complex, (0..count as u32).collect(), count);
     let outlines: Vec<_> = (0..count as u32).map(|r| regions.outline_of(r)).collect();
     let shapes = regions.all.iter().zip(&outlines).map(|(region, outline)| regions.shape(region, outline));
-    shapes.map(|shape| limits.allow(&shape)).collect()
+    Ok(shapes.map(|shape| limits.allow(&shape)).collect())
 }
 
 /// The best legal cut along a level of the area scale.
-fn across_protrusion(dual: &Dual, log_scale: &[f64], limits: &Limits) -> Option<Vec<u32>> {
+fn across_protrusion(dual: &Dual, log_scale: &[f64], limits: &Limits) -> Result<Option<Vec<u32>>, Interrupted> {
     let mut sorted = log_scale.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let (low, high) = (sorted[sorted.len() / 1000], sorted[sorted.len() - 1 - sorted.len() / 1000]);
-    let cut = |level: f64| {
-        let labels = below(dual, log_scale, low + level * (high - low))?;
+    let mut best: Option<(f64, Vec<u32>)> = None;
+    for level in LEVELS {
+        let Some(labels) = below(dual, log_scale, low + level * (high - low)) else { continue };
         let groups = Cells { of: labels, count: 2 };
         let cost = cut_length(dual, &groups.of) * (1.0 + OFF_CENTRE * (level - 0.5).abs());
-        legal(dual, &Complex::new(dual, &groups), limits).iter().all(|l| *l).then_some((cost, groups.of))
-    };
-    let cuts = LEVELS.iter().filter_map(|level| cut(*level));
-    cuts.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, labels)| labels)
+        let is_legal = legal(dual, &Complex::new(dual, &groups), limits)?.iter().all(|l| *l);
+        // Of cuts that cost the same, the first one.
+        if is_legal && best.as_ref().is_none_or(|b| cost.total_cmp(&b.0).is_lt()) {
+            best = Some((cost, groups.of));
+        }
+    }
+    Ok(best.map(|(_, labels)| labels))
 }
 
 fn cut_length(dual: &Dual, labels: &[u32]) -> f64 {
-    let label = |h: HalfEdgeId| labels[h.face().index()];
-    let cut = |h: &HalfEdgeId| dual.across(*h).is_some_and(|t| label(t) != label(*h));
-    dual.half_edges().filter(cut).map(|h| dual.length(h)).sum()
+    let parts = Partition::new(dual, labels);
+    dual.half_edges().filter(|h| parts.is_seam(*h)).map(|h| dual.length(h)).sum()
 }
 
 /// Label 1 for the connected region below `level` that holds the least scale, filled up so that the rest (label 0),
@@ -214,19 +220,8 @@ fn below(dual: &Dual, log_scale: &[f64], level: f64) -> Option<Vec<u32>> {
 
 /// The triangles among those that `admit` tells which are connected to `seed`.
 fn connected(dual: &Dual, seed: usize, admit: impl Fn(usize) -> bool) -> Vec<bool> {
-    let mut sets = joined(dual, |f, g| admit(f) && admit(g));
+    let admits = |h: HalfEdgeId| admit(h.face().index());
+    let mut sets = dual.united(|h, twin| admits(h) && admits(twin));
     let root = sets.find(seed);
-    (0..dual.mesh.triangles().len()).map(|f| admit(FaceId::at(f).index()) && sets.find(f) == root).collect()
-}
-
-/// The triangles, united with those neighbours with which they are `together`.
-fn joined(dual: &Dual, together: impl Fn(usize, usize) -> bool) -> UnionFind {
-    let mut sets = UnionFind::new(dual.mesh.triangles().len());
-    for h in dual.half_edges() {
-        let beyond = dual.across(h).map(|t| t.face().index());
-        if let Some(other) = beyond.filter(|other| together(h.face().index(), *other)) {
-            sets.unite(h.face().index(), other);
-        }
-    }
-    sets
+    (0..dual.mesh.triangles().len()).map(|f| admit(f) && sets.find(f) == root).collect()
 }

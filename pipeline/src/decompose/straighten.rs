@@ -9,9 +9,10 @@ use super::dual::Dual;
 use super::lay::Path;
 use super::network::Network;
 use super::shortest::{Bounds, Goal, Tree, length, reversed, weight};
-use super::voronoi::At;
+use crate::monitor::Interrupted;
 use crate::topology::HalfEdgeId;
-use std::collections::{BTreeSet, BinaryHeap};
+use crate::topology::dijkstra::ShortestPaths;
+use std::collections::BTreeSet;
 
 /// Rounds over all seams and corners, and the share of the length that makes another one worth while.
 const ROUNDS: usize = 2;
@@ -43,30 +44,50 @@ struct Straightening<'n, 'a> {
     vain: BTreeSet<(Option<usize>, Vec<HalfEdgeId>)>,
 }
 
+/// What became of a seam that was to be replaced by the shortest path.
+enum Shortened {
+    /// This path is in its place.
+    To(Vec<HalfEdgeId>),
+    /// It stays: no path is shorter.
+    Straight,
+    /// It stays: with the shorter path in its place a chart would be illegal.
+    Illegal,
+}
+
 /// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges, nor along a
-/// `barred` edge. Whether they became so much shorter that it is worth while to do it again.
-pub(super) fn straighten(network: &mut Network, barred: &[bool], breadth: impl Fn(HalfEdgeId) -> f64) -> bool {
+/// `barred` edge.
+///
+/// # Errors
+/// [`Interrupted`]: the network is half way between two states then, and no use any more.
+pub(super) fn straighten(
+    network: &mut Network,
+    barred: &[bool],
+    breadth: impl Fn(HalfEdgeId) -> f64,
+) -> Result<(), Interrupted> {
     let dual = network.dual;
     let reach = REACH * (dual.total_area() / network.charts().max(1) as f64).sqrt();
-    let band = band(network, breadth);
+    let band = band(network, breadth)?;
     let mut work = Straightening::new(network, reach, band, barred);
-    let mut lengths = vec![work.total()];
-    let is_worth = |after: f64, before: f64| after < (1.0 - LEAST_GAIN) * before;
-    for round in 0..ROUNDS {
-        work.seams();
-        work.corners();
-        lengths.push(work.total());
-        if !is_worth(lengths[round + 1], lengths[round]) {
+    let mut before = work.total();
+    for _ in 0..ROUNDS {
+        work.seams()?;
+        work.corners()?;
+        let after = work.total();
+        if after >= (1.0 - LEAST_GAIN) * before {
             break;
         }
+        before = after;
     }
-    is_worth(lengths[lengths.len() - 1], lengths[0])
+    Ok(())
 }
 
 /// Pulls straight the seams of charts that are `wanted`, and parts of them, that are more than `bent` times as long as
 /// they must be, as far as the others let it, and whatever becomes of the charts, as long as they are legal. Corners stay where they are, and
 /// closed seams are held at [`PINS`] of their vertices. Whether anything changed.
-pub(super) fn relax(network: &mut Network, bent: f64, wanted: impl Fn(u32) -> bool) -> bool {
+///
+/// # Errors
+/// As [`straighten`].
+pub(super) fn relax(network: &mut Network, bent: f64, wanted: impl Fn(u32) -> bool) -> Result<bool, Interrupted> {
     let everywhere = vec![true; network.dual.mesh.points().len()];
     let barred = vec![false; network.dual.mesh.edges().len()];
     let mut work = Straightening { share: 1.0 / bent, ..Straightening::new(network, 0.0, everywhere, &barred) };
@@ -80,23 +101,26 @@ pub(super) fn relax(network: &mut Network, bent: f64, wanted: impl Fn(u32) -> bo
             // The vertices that hold a closed one are not known any more in the next round.
             let pieces = if closed { PINS } else { 1 };
             for part in path.chunks(path.len().div_ceil(pieces)).filter(|_| !closed || round == 0) {
-                changed |= work.shorten_all(part.to_vec());
+                changed |= work.shorten_all(part.to_vec())?;
             }
         }
     }
-    changed
+    Ok(changed)
 }
 
 /// Takes the corners out of closed seams, at little cost of the area inside. Whether anything changed.
-pub(super) fn round_off(network: &mut Network) -> bool {
+///
+/// # Errors
+/// As [`straighten`].
+pub(super) fn round_off(network: &mut Network) -> Result<bool, Interrupted> {
     let everywhere = vec![true; network.dual.mesh.points().len()];
     let barred = vec![false; network.dual.mesh.edges().len()];
     let mut work = Straightening::new(network, 0.0, everywhere, &barred);
     let mut changed = false;
     for path in work.network.curves() {
-        changed |= work.dual.is_closed(&path) && work.shorten_loop(path, EIGHTHS, 2 * EIGHTHS);
+        changed |= work.dual.is_closed(&path) && work.shorten_loop(path, EIGHTHS, 2 * EIGHTHS)?;
     }
-    changed
+    Ok(changed)
 }
 
 /// A closed seam is rounded off in so many parts: between these, a circle loses a tenth of its area.
@@ -120,7 +144,7 @@ impl<'n, 'a> Straightening<'n, 'a> {
     }
 
     /// One pass over all seams.
-    fn seams(&mut self) {
+    fn seams(&mut self) -> Result<(), Interrupted> {
         for path in self.network.curves() {
             let closed = self.dual.is_closed(&path);
             let tried = (None, path);
@@ -128,39 +152,44 @@ impl<'n, 'a> Straightening<'n, 'a> {
                 continue;
             }
             let path = tried.1.clone();
-            let shorter = if closed { self.shorten_loop(path, 3, 12) } else { self.shorten_all(path) };
+            let shorter = if closed { self.shorten_loop(path, 3, 12)? } else { self.shorten_all(path)? };
             if !shorter {
                 self.vain.insert(tried);
             }
         }
+        Ok(())
     }
 
     /// A seam as a whole; where that fails, by overlapping pieces, then by pieces half as long, down to a few edges.
     /// Whether it became shorter.
-    fn shorten_all(&mut self, mut path: Vec<HalfEdgeId>) -> bool {
+    fn shorten_all(&mut self, mut path: Vec<HalfEdgeId>) -> Result<bool, Interrupted> {
         let (mut pieces, mut shorter, mut done) = (1, false, false);
         while !done && path.len() / pieces >= FEW {
             done = true;
             for half in 0..2 * pieces - 1 {
                 let n = path.len();
                 let range = half * n / (2 * pieces)..(half + 2) * n / (2 * pieces);
-                match self.shorten(&path[range.clone()]) {
-                    Ok(piece) => {
+                match self.shorten(&path[range.clone()])? {
+                    Shortened::To(piece) => {
                         drop(path.splice(range, piece));
                         shorter = true;
                     }
-                    Err(straight) => done &= straight,
+                    Shortened::Straight => {}
+                    // Parts of it may be shortened all the same.
+                    Shortened::Illegal => done = false,
                 }
             }
             pieces *= 2;
         }
-        shorter
+        Ok(shorter)
     }
 
-    /// The shortest path in the place of a seam (or a part of one); else whether there was none that is shorter.
-    fn shorten(&mut self, path: &[HalfEdgeId]) -> Result<Vec<HalfEdgeId>, bool> {
-        let (Some(first), Some(last)) = (path.first().copied(), path.last().copied()) else { return Err(true) };
-        let Some(beyond) = self.dual.across(first) else { return Err(true) };
+    /// Puts the shortest path in the place of a seam, or of a part of one.
+    fn shorten(&mut self, path: &[HalfEdgeId]) -> Result<Shortened, Interrupted> {
+        let (Some(first), Some(last)) = (path.first().copied(), path.last().copied()) else {
+            return Ok(Shortened::Straight);
+        };
+        let Some(beyond) = self.dual.across(first) else { return Ok(Shortened::Straight) };
         let (left, right) = (self.network.label(first), self.network.label(beyond));
         let (from, to) = (self.dual.from(first), self.dual.to(last));
         let labels = [left, right];
@@ -173,36 +202,35 @@ impl<'n, 'a> Straightening<'n, 'a> {
             band: &self.band,
             barred: self.barred,
         };
-        self.trees[0].grow(self.network, from, &bounds);
-        let found = self.trees[0].distance(to).map(|_| self.trees[0].path(self.dual, to));
-        let Some(half_edges) = found else {
+        self.trees[0].grow(self.network, from, &bounds)?;
+        let Some(half_edges) = self.trees[0].path(self.dual, to) else {
             self.network.put_back(path);
-            return Err(true);
+            return Ok(Shortened::Straight);
         };
         let laid = self.network.lay(path, &[Path { half_edges: half_edges.clone(), left, right }], &labels);
-        if laid { Ok(half_edges) } else { Err(false) }
+        Ok(if laid { Shortened::To(half_edges) } else { Shortened::Illegal })
     }
 
     /// A closed seam: its parts, then those that begin in the middle of these. Whether it became shorter.
-    fn shorten_loop(&mut self, mut path: Vec<HalfEdgeId>, parts: usize, turns: usize) -> bool {
+    fn shorten_loop(&mut self, mut path: Vec<HalfEdgeId>, parts: usize, turns: usize) -> Result<bool, Interrupted> {
         let mut shorter = false;
         for turn in 0..turns {
             let part = path.len() / parts;
             if part < 2 {
                 break;
             }
-            if let Ok(piece) = self.shorten(&path[..part]) {
+            if let Shortened::To(piece) = self.shorten(&path[..part])? {
                 path.splice(..part, piece);
                 shorter = true;
             }
             let step = if turn % parts == parts - 1 { part / 2 } else { part };
             path.rotate_left(step);
         }
-        shorter
+        Ok(shorter)
     }
 
     /// One pass over all corners.
-    fn corners(&mut self) {
+    fn corners(&mut self) -> Result<(), Interrupted> {
         for vertex in 0..self.dual.mesh.points().len() {
             let seams = match (self.network.is_open(vertex), self.network.degree(vertex)) {
                 (false, 3) | (true, 1) => self.network.seams_at(vertex),
@@ -214,24 +242,25 @@ impl<'n, 'a> Straightening<'n, 'a> {
                 continue;
             }
             let moved = match &arms[..] {
-                [arm] => self.slide(vertex, arm),
-                [_, _, _] => self.move_corner(vertex, &arms),
-                _ => None,
+                [arm] => self.slide(vertex, arm)?,
+                [_, _, _] => self.move_corner(vertex, &arms)?,
+                _ => false,
             };
-            if moved.is_none() {
+            if !moved {
                 self.vain.insert(tried);
             }
         }
+        Ok(())
     }
 
-    /// Moves a corner of three seams to where they are shortest.
-    fn move_corner(&mut self, corner: usize, arms: &[Vec<HalfEdgeId>]) -> Option<()> {
+    /// Moves a corner of three seams to where they are shortest; whether there was such a place.
+    fn move_corner(&mut self, corner: usize, arms: &[Vec<HalfEdgeId>]) -> Result<bool, Interrupted> {
         let starts: Vec<HalfEdgeId> = arms.iter().map(|a| a[0]).collect();
         let ends: Vec<usize> = arms.iter().map(|a| self.dual.to(a[a.len() - 1])).collect();
         let labels: Vec<u32> = starts.iter().map(|h| self.network.label(*h)).collect();
         let distinct = |v: &[u32]| v[0] != v[1] && v[1] != v[2] && v[2] != v[0];
         if !distinct(&labels) || ends.contains(&corner) {
-            return None;
+            return Ok(false);
         }
         let before: f64 = arms.iter().map(|a| length(self.dual, a)).sum();
         let sides: Vec<_> = starts
@@ -239,40 +268,48 @@ impl<'n, 'a> Straightening<'n, 'a> {
             .filter_map(|h| Some((self.network.label(*h), self.network.label(self.dual.across(*h)?))))
             .collect();
         arms.iter().for_each(|a| self.network.lift(a));
-        let Some(ways) = self.meeting(&ends, &labels, before) else {
+        let Some(ways) = self.meeting(&ends, &labels, before)? else {
             arms.iter().for_each(|a| self.network.put_back(a));
-            return None;
+            return Ok(false);
         };
         let path = |(half_edges, (left, right))| Path { half_edges, left, right };
         let paths: Vec<Path> = ways.into_iter().zip(sides).map(path).collect();
-        self.network.lay(&arms.concat(), &paths, &labels).then_some(())
+        Ok(self.network.lay(&arms.concat(), &paths, &labels))
     }
 
     /// The ways from the vertex where the sum of the distances to three `ends` is least, if it is less than `before`.
-    fn meeting(&mut self, ends: &[usize], labels: &[u32], before: f64) -> Option<Vec<Vec<HalfEdgeId>>> {
+    fn meeting(
+        &mut self,
+        ends: &[usize],
+        labels: &[u32],
+        before: f64,
+    ) -> Result<Option<Vec<Vec<HalfEdgeId>>>, Interrupted> {
         let length = self.share * before;
         let [first, second, third] = &mut self.trees;
         let meeting =
             |a, b| Bounds { goal: Goal::Meeting([a, b]), labels, length, band: &self.band, barred: self.barred };
-        first.grow(self.network, ends[0], &meeting((ends[1], None), (ends[2], None)));
-        second.grow(self.network, ends[1], &meeting((ends[0], Some(first)), (ends[2], None)));
-        third.grow(self.network, ends[2], &meeting((ends[0], Some(first)), (ends[1], Some(second))));
+        first.grow(self.network, ends[0], &meeting((ends[1], None), (ends[2], None)))?;
+        second.grow(self.network, ends[1], &meeting((ends[0], Some(first)), (ends[2], None)))?;
+        third.grow(self.network, ends[2], &meeting((ends[0], Some(first)), (ends[1], Some(second))))?;
         let sum = |v: usize| Some(self.trees[0].distance(v)? + self.trees[1].distance(v)? + self.trees[2].distance(v)?);
         let known = self.trees[2].settled.iter().filter(|v| !ends.contains(v)).filter_map(|v| Some((sum(*v)?, *v)));
-        let (least, vertex) = known.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
-        let ways: Vec<_> = self.trees.iter().map(|t| reversed(self.dual, &t.path(self.dual, vertex))).collect();
+        let nearest = known.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let Some((least, vertex)) = nearest else { return Ok(None) };
+        let paths = self.trees.iter().filter_map(|tree| tree.path(self.dual, vertex));
+        let ways: Vec<Vec<HalfEdgeId>> = paths.map(|path| reversed(self.dual, &path)).collect();
         let mut on_way: Vec<usize> = ways.iter().flatten().map(|h| self.dual.to(*h)).collect();
         let all = on_way.len();
         on_way.sort_unstable();
         on_way.dedup();
-        (least < self.share * before && on_way.len() == all).then_some(ways)
+        Ok((least < self.share * before && on_way.len() == all).then_some(ways))
     }
 
-    /// Moves the end of a seam along the open boundary to where the seam is shortest.
-    fn slide(&mut self, end: usize, arm: &[HalfEdgeId]) -> Option<()> {
+    /// Moves the end of a seam along the open boundary to where the seam is shortest; whether there was such a place.
+    fn slide(&mut self, end: usize, arm: &[HalfEdgeId]) -> Result<bool, Interrupted> {
         let start = arm[0];
         let root = self.dual.to(arm[arm.len() - 1]);
-        let (left, right) = (self.network.label(start), self.network.label(self.dual.across(start)?));
+        let Some(beyond) = self.dual.across(start) else { return Ok(false) };
+        let (left, right) = (self.network.label(start), self.network.label(beyond));
         let labels = [left, right];
         let before = length(self.dual, arm);
         self.network.lift(arm);
@@ -284,44 +321,37 @@ impl<'n, 'a> Straightening<'n, 'a> {
             barred: self.barred,
         };
         let tree = &mut self.trees[0];
-        tree.grow(self.network, root, &bounds);
+        tree.grow(self.network, root, &bounds)?;
         let open = tree.settled.last().copied().filter(|v| *v != root && self.network.on_one_loop(*v, end));
-        let Some(vertex) = open else {
+        let Some(path) = open.and_then(|vertex| tree.path(self.dual, vertex)) else {
             self.network.put_back(arm);
-            return None;
+            return Ok(false);
         };
-        let half_edges = reversed(self.dual, &tree.path(self.dual, vertex));
-        self.network.lay(arm, &[Path { half_edges, left, right }], &labels).then_some(())
+        let half_edges = reversed(self.dual, &path);
+        Ok(self.network.lay(arm, &[Path { half_edges, left, right }], &labels))
     }
 }
 
-/// The vertices on seams, and those no farther from one than `breadth` at one of its half-edges. Dijkstra by what is
-/// left of it, as long as somebody waits.
-fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Vec<bool> {
+/// The vertices on seams, and those no farther from one than `breadth` at one of its half-edges.
+fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Result<Vec<bool>, Interrupted> {
     let dual = network.dual;
-    let mut left = vec![0.0_f64; dual.mesh.points().len()];
-    let mut heap = BinaryHeap::new();
+    let vertices = dual.mesh.points().len();
+    // Every vertex of a seam begins as far ahead of 0 as the band is broad there: what is reached before 0 lies in it.
+    let mut paths = ShortestPaths::new(vertices, ());
     for h in network.seams() {
         let breadth = breadth(h);
-        if breadth > left[dual.from(h)] {
-            left[dual.from(h)] = breadth;
-            heap.push(At { distance: -breadth, node: dual.from(h) as u32 });
+        if breadth > 0.0 {
+            paths.reach(dual.from(h), -breadth, ());
         }
     }
-    while let Some(At { distance, node }) = heap.pop() {
-        if -distance < left[node as usize] {
-            continue;
-        }
-        if !dual.checkpoint.goes_on(1) {
-            break;
-        }
-        network.each_out(node as usize, |h| {
-            let rest = -distance - dual.length(h);
-            if rest > left[dual.to(h)] {
-                left[dual.to(h)] = rest;
-                heap.push(At { distance: -rest, node: dual.to(h) as u32 });
+    while let Some(node) = paths.settle() {
+        dual.checkpoint.after(1)?;
+        network.each_out(node.index, |h| {
+            let distance = node.distance + dual.length(h);
+            if distance < 0.0 {
+                paths.reach(dual.to(h), distance, ());
             }
         });
     }
-    left.into_iter().enumerate().map(|(v, l)| l > 0.0 || network.degree(v) > 0).collect()
+    Ok((0..vertices).map(|v| paths.distance(v).is_some() || network.degree(v) > 0).collect())
 }

@@ -148,7 +148,7 @@ fn prediction_agrees_with_the_map_within_a_decade() {
         let limits = Limits::new(&smooth());
         let (cells, _) = cells(&dual, &limits).expect("nobody cancels");
         let network = network::Network::new(&dual, vec![0; mesh.triangles().len()], limits);
-        let predicted = judge::judge(&network, &cells)[0].expect("a chart").ratio;
+        let predicted = judge::judge(&network, &cells).expect("nobody interrupts")[0].expect("a chart").ratio;
         let chart = assemble(&mesh, &network.labels).expect("a disk").into_charts().remove(0);
         let measured = parametrize_chart(chart, Order::Linear).expect("maps").distortion().area_ratio;
         assert!((predicted / measured).log10().abs() < 1.0, "length {length}: {predicted:.1e}, {measured:.1e}");

@@ -5,6 +5,8 @@
 //! that cells follow the shape, not the triangulation. A new seed only visits what comes closer to it: with k seeds
 //! on n evenly spread nodes about n log k visits.
 
+use crate::monitor::Interrupted;
+use crate::topology::dijkstra::ShortestPaths;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::collections::binary_heap::PeekMut;
@@ -26,33 +28,11 @@ pub(super) struct Cells {
     pub count: usize,
 }
 
-/// A node at a distance; the greatest is the nearest one (for heaps), ties go to the least node.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) struct At {
-    pub distance: f64,
-    pub node: u32,
-}
-
-impl Eq for At {}
-
-impl PartialOrd for At {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for At {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.distance.total_cmp(&self.distance).then(other.node.cmp(&self.node))
-    }
-}
-
 /// The cells while seeds are added.
 struct Growth<'a, G> {
     graph: &'a G,
-    distance: Vec<f64>,
-    of: Vec<u32>,
-    heap: BinaryHeap<At>,
+    /// Every node has the cell of the seed that is nearest for a label.
+    paths: ShortestPaths<u32>,
     /// Nodes in the order in which they were first reached.
     reached: Vec<usize>,
     /// Seeds in the order of their cells.
@@ -61,44 +41,30 @@ struct Growth<'a, G> {
 
 impl<'a, G: Graph> Growth<'a, G> {
     fn new(graph: &'a G) -> Self {
-        let n = graph.len();
-        let (distance, of) = (vec![f64::INFINITY; n], vec![NO_CELL; n]);
-        Self { graph, distance, of, heap: BinaryHeap::new(), reached: Vec::new(), seeds: Vec::new() }
+        let paths = ShortestPaths::new(graph.len(), NO_CELL);
+        Self { graph, paths, reached: Vec::new(), seeds: Vec::new() }
     }
 
-    /// Adds a seed; every node that comes closer changes to its cell. Ends because a node is visited only with a
-    /// distance below its last one.
+    /// Adds a seed; every node that comes closer changes to its cell.
     fn seed(&mut self, node: usize, cell: u32) {
-        if self.of[node] == NO_CELL {
+        if self.paths.label(node).is_none() {
             self.reached.push(node);
         }
-        self.distance[node] = 0.0;
-        self.of[node] = cell;
-        self.heap.push(At { distance: 0.0, node: node as u32 });
-        while let Some(At { distance, node }) = self.heap.pop() {
-            if distance > self.distance[node as usize] || self.of[node as usize] != cell {
-                continue;
-            }
-            let (distances, of, heap, reached) = (&mut self.distance, &mut self.of, &mut self.heap, &mut self.reached);
-            self.graph.each_neighbour(node as usize, |other, step| {
-                if distance + step < distances[other] {
-                    if of[other] == NO_CELL {
-                        reached.push(other);
-                    }
-                    distances[other] = distance + step;
-                    of[other] = cell;
-                    heap.push(At { distance: distance + step, node: other as u32 });
+        self.paths.start(node, cell);
+        while let Some(node) = self.paths.settle() {
+            let (paths, reached) = (&mut self.paths, &mut self.reached);
+            self.graph.each_neighbour(node.index, |other, step| {
+                let is_new = paths.label(other).is_none();
+                if paths.reach(other, node.distance + step, cell) && is_new {
+                    reached.push(other);
                 }
             });
         }
     }
 
-    /// Forgets the cells of these nodes.
-    fn clear(&mut self, nodes: &[usize]) {
-        for node in nodes {
-            self.distance[*node] = f64::INFINITY;
-            self.of[*node] = NO_CELL;
-        }
+    /// The distance of a node from the nearest seed.
+    fn distance(&self, node: usize) -> f64 {
+        self.paths.distance(node).unwrap_or(f64::INFINITY)
     }
 
     /// Cuts the connected component of `start`, which has no cells yet, into cells numbered from `first` on:
@@ -108,24 +74,24 @@ impl<'a, G: Graph> Growth<'a, G> {
         self.seed(start, first);
         let mut nodes = std::mem::take(&mut self.reached);
         nodes.sort_unstable();
-        let distance = &self.distance;
-        let farthest = nodes.iter().copied().max_by(|a, b| distance[*a].total_cmp(&distance[*b]).then(b.cmp(a)));
-        let tip = farthest.unwrap_or(start);
-        self.clear(&nodes);
+        let by_distance = |a: &usize, b: &usize| self.distance(*a).total_cmp(&self.distance(*b)).then(b.cmp(a));
+        let tip = nodes.iter().copied().max_by(by_distance).unwrap_or(start);
+        nodes.iter().for_each(|node| self.paths.forget(*node));
         self.seed(tip, first);
         self.seeds.push(tip);
         self.reached.clear();
         let others = nodes.iter().filter(|i| **i != tip);
-        let mut far: BinaryHeap<Far> = others.map(|i| Far(self.distance[*i], *i as u32)).collect();
+        let mut far: BinaryHeap<Far> = others.map(|i| Far(self.distance(*i), *i as u32)).collect();
         let mut next = first + 1;
         let end = first + wanted(&nodes).clamp(1, nodes.len()) as u32;
         while next < end
             && let Some(mut farthest) = far.peek_mut()
         {
             let node = farthest.1 as usize;
-            if self.distance[node] < farthest.0 {
+            let distance = self.distance(node);
+            if distance < farthest.0 {
                 // Distances only shrink: each entry comes up at most once per seed that changed it.
-                farthest.0 = self.distance[node];
+                farthest.0 = distance;
                 continue;
             }
             PeekMut::pop(farthest);
@@ -139,8 +105,8 @@ impl<'a, G: Graph> Growth<'a, G> {
     /// Cuts all components without cells.
     fn all(&mut self, wanted: impl Fn(&[usize]) -> usize) -> usize {
         let mut count = 0;
-        for start in 0..self.of.len() {
-            if self.of[start] == NO_CELL {
+        for start in 0..self.graph.len() {
+            if self.paths.label(start).is_none() {
                 count = self.component(start, count, &wanted);
             }
         }
@@ -153,7 +119,7 @@ impl<'a, G: Graph> Growth<'a, G> {
 pub(super) fn farthest_first<G: Graph>(graph: &G, wanted: impl Fn(&[usize]) -> usize) -> Cells {
     let mut growth = Growth::new(graph);
     let count = growth.all(wanted);
-    Cells { of: growth.of, count }
+    Cells { of: labels(&growth.paths, graph.len()), count }
 }
 
 /// The seeds of [`farthest_first`], in the order of their cells.
@@ -165,26 +131,21 @@ pub(super) fn seeds<G: Graph>(graph: &G, wanted: impl Fn(&[usize]) -> usize) -> 
 
 /// The cells of these seeds, one or more in each component: every node belongs to the nearest one.
 pub(super) fn nearest<G: Graph>(graph: &G, seeds: &[usize]) -> Cells {
-    let (mut distance, mut of) = (vec![f64::INFINITY; graph.len()], vec![NO_CELL; graph.len()]);
-    let mut heap = BinaryHeap::new();
+    let mut paths = ShortestPaths::new(graph.len(), NO_CELL);
     for (seed, cell) in seeds.iter().zip(0..) {
-        (distance[*seed], of[*seed]) = (0.0, cell);
-        heap.push(At { distance: 0.0, node: *seed as u32 });
+        paths.start(*seed, cell);
     }
-    // Ends because a node is visited only with a distance below its last one.
-    while let Some(At { distance: so_far, node }) = heap.pop() {
-        let node = node as usize;
-        if so_far > distance[node] {
-            continue;
-        }
-        graph.each_neighbour(node, |other, step| {
-            if so_far + step < distance[other] {
-                (distance[other], of[other]) = (so_far + step, of[node]);
-                heap.push(At { distance: so_far + step, node: other as u32 });
-            }
+    while let Some(node) = paths.settle() {
+        graph.each_neighbour(node.index, |other, step| {
+            paths.reach(other, node.distance + step, node.label);
         });
     }
-    Cells { of, count: seeds.len() }
+    Cells { of: labels(&paths, graph.len()), count: seeds.len() }
+}
+
+/// Per node its cell.
+fn labels(paths: &ShortestPaths<u32>, nodes: usize) -> Vec<u32> {
+    (0..nodes).map(|node| paths.label(node).unwrap_or(NO_CELL)).collect()
 }
 
 /// A node by its distance; the greatest is the farthest one, ties go to the least node.
@@ -227,24 +188,30 @@ impl<G: Graph> Graph for Within<'_, G> {
 
 /// Bisects cells until `fine` tells that all are, which it must for single nodes: then it ends, as every round makes
 /// the others smaller.
-pub(super) fn bisect_until<G: Graph>(graph: &G, mut cells: Cells, mut fine: impl FnMut(&Cells) -> Vec<bool>) -> Cells {
+///
+/// # Errors
+/// That of `fine`.
+pub(super) fn bisect_until<G: Graph>(
+    graph: &G,
+    mut cells: Cells,
+    mut fine: impl FnMut(&Cells) -> Result<Vec<bool>, Interrupted>,
+) -> Result<Cells, Interrupted> {
     loop {
-        let fine = fine(&cells);
+        let fine = fine(&cells)?;
         let coarse: Vec<usize> = (0..cells.of.len()).filter(|i| !fine[cells.of[*i] as usize]).collect();
         if coarse.is_empty() {
-            return cells;
+            return Ok(cells);
         }
         let within = Within { graph, of: &cells.of };
         let mut growth = Growth::new(&within);
-        growth.of.clone_from(&cells.of);
-        growth.clear(&coarse);
         let mut count = cells.count as u32;
         for node in coarse {
-            if growth.of[node] == NO_CELL {
+            if growth.paths.label(node).is_none() {
                 count = growth.component(node, count, |_| 2);
             }
         }
-        cells = Cells::renumbered(growth.of);
+        let halved = cells.of.iter().enumerate().map(|(node, cell)| growth.paths.label(node).unwrap_or(*cell));
+        cells = Cells::renumbered(halved.collect());
     }
 }
 

@@ -33,7 +33,7 @@ pub fn on_triangle(x: Vec3, p: [Vec3; 3]) -> OnTriangle {
     }
     let mut best = OnTriangle { weights: [1.0, 0.0, 0.0], squared: f64::INFINITY };
     for k in 0..3 {
-        let (t, squared) = on_segment(x, [p[k], p[(k + 1) % 3]]);
+        let OnSegment { share: t, squared } = on_segment(x, [p[k], p[(k + 1) % 3]]);
         if squared < best.squared {
             let mut weights = [0.0; 3];
             weights[k] = 1.0 - t;
@@ -44,8 +44,26 @@ pub fn on_triangle(x: Vec3, p: [Vec3; 3]) -> OnTriangle {
     best
 }
 
-/// The share of the segment `p`, from its begin, at which it is closest to `x`, and the squared distance there.
-pub fn on_segment(x: Vec3, p: [Vec3; 2]) -> (f64, f64) {
+/// A point of a segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OnSegment {
+    /// Where it is, as a share of the segment from its begin: in [0, 1].
+    pub share: f64,
+    /// The squared distance to the point asked for.
+    pub squared: f64,
+}
+
+/// The point of the segment `p` closest to `x`.
+///
+/// ```
+/// use planish_core::evaluate::on_segment;
+///
+/// let segment = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]];
+/// let beside = on_segment([1.0, 3.0, 0.0], segment);
+/// assert_eq!((beside.share, beside.squared), (0.25, 9.0));
+/// assert_eq!(on_segment([9.0, 0.0, 0.0], segment).share, 1.0, "beyond its end");
+/// ```
+pub fn on_segment(x: Vec3, p: [Vec3; 2]) -> OnSegment {
     let along = sub(p[1], p[0]);
     let length = dot(along, along);
     let t = if length > 0.0 { (dot(sub(x, p[0]), along) / length).clamp(0.0, 1.0) } else { 0.0 };
@@ -55,7 +73,7 @@ pub fn on_segment(x: Vec3, p: [Vec3; 2]) -> (f64, f64) {
     } else {
         [0, 1, 2].map(|k| x[k] - (p[1][k] - (1.0 - t) * along[k]))
     };
-    (t, dot(gap, gap))
+    OnSegment { share: t, squared: dot(gap, gap) }
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ mod plane;
 pub(crate) use bvh::larger;
 use bvh::smaller;
 pub use bvh::{Bvh, along_curve};
-pub use closest::{OnTriangle, on_segment, on_triangle};
+pub use closest::{OnSegment, OnTriangle, on_segment, on_triangle};
 pub use plane::Plane;
 
 use crate::vec3::{BoundingBox, Vec3};

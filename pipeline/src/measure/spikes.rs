@@ -17,7 +17,7 @@ use crate::atlas::Chart;
 use crate::evaluate::on_segment;
 use crate::measure::curvature::Principal;
 use crate::mesh::SurfaceMesh;
-use crate::topology::{FaceId, HalfEdgeId, VisitStamps};
+use crate::topology::{ChartId, FaceId, HalfEdgeId, VisitStamps};
 use crate::vec3::{Vec3, cross, distance, dot, norm, sub, triangle_area};
 use std::f64::consts::{PI, TAU};
 
@@ -110,27 +110,27 @@ impl Thin {
 /// Walks over the triangles in balls around vertices.
 struct Search<'a> {
     mesh: &'a SurfaceMesh,
-    /// Per triangle its chart, none where it has none.
-    chart: Vec<u32>,
-    /// Per vertex a triangle beside it.
-    beside: Vec<u32>,
+    /// Per triangle its chart, if it has one.
+    chart: Vec<Option<ChartId>>,
+    /// Per vertex a triangle beside it, if there is one.
+    beside: Vec<Option<FaceId>>,
     /// The triangles that the walk has reached.
     seen: VisitStamps,
     /// The triangles of a walk, in the order in which they were reached.
-    queue: Vec<u32>,
+    queue: Vec<FaceId>,
     /// Per vertex, whether it lies in the ball around a thin place.
     within: Vec<bool>,
 }
 
 impl<'a> Search<'a> {
     fn new<C: AsRef<Chart>>(mesh: &'a SurfaceMesh, charts: &[C]) -> Self {
-        let mut chart = vec![u32::MAX; mesh.triangles().len()];
-        for (c, id) in charts.iter().zip(0..) {
-            c.as_ref().faces().iter().for_each(|f| chart[f.index()] = id);
+        let mut chart = vec![None; mesh.triangles().len()];
+        for (number, part) in charts.iter().map(AsRef::as_ref).enumerate() {
+            part.faces().iter().for_each(|f| chart[f.index()] = Some(ChartId::at(number)));
         }
-        let mut beside = vec![u32::MAX; mesh.points().len()];
-        for (t, face) in mesh.triangles().iter().zip(0..) {
-            t.iter().for_each(|v| beside[v.index()] = face);
+        let mut beside = vec![None; mesh.points().len()];
+        for (face, t) in mesh.triangles().iter().enumerate() {
+            t.iter().for_each(|v| beside[v.index()] = Some(FaceId::at(face)));
         }
         let (seen, within) = (VisitStamps::new(chart.len()), vec![false; beside.len()]);
         Self { mesh, chart, beside, seen, queue: Vec::new(), within }
@@ -142,14 +142,12 @@ impl<'a> Search<'a> {
         self.within.fill(false);
         let mut thin = Vec::new();
         for v in vertices.iter().copied() {
-            if is_done[v] || self.beside[v] == u32::MAX {
-                continue;
-            }
-            let share = self.thin_share(v, radius);
+            let Some(beside) = self.beside[v].filter(|_| !is_done[v]) else { continue };
+            let share = self.thin_share(v, beside, radius);
             let is_thin = share.is_some();
             let done = radius * if is_thin { 0.5 } else { 0.125 };
             for face in &self.queue {
-                for corner in self.mesh.triangles()[*face as usize] {
+                for corner in self.mesh.triangles()[face.index()] {
                     let away = distance(self.mesh.points()[corner.index()], self.mesh.points()[v]);
                     is_done[corner.index()] |= away < done;
                     self.within[corner.index()] |= is_thin && away < radius;
@@ -160,26 +158,26 @@ impl<'a> Search<'a> {
         thin
     }
 
-    /// The area of the surface within `radius` of a vertex, beside that of a disk; none unless it is all in one chart, and
-    /// thin. Leaves the triangles in `queue`.
-    fn thin_share(&mut self, vertex: usize, radius: f64) -> Option<f64> {
+    /// The area of the surface within `radius` of a vertex, which a triangle is `beside`, as a share of that of a disk; none
+    /// unless it is all in one chart, and thin. Leaves the triangles in `queue`.
+    fn thin_share(&mut self, vertex: usize, beside: FaceId, radius: f64) -> Option<f64> {
         let centre = self.mesh.points()[vertex];
         let disk = PI * radius * radius;
         let mut area = 0.0;
         self.seen.clear();
         self.queue.clear();
-        self.reach(self.beside[vertex]);
+        self.reach(beside);
         let mut next = 0;
         while let Some(face) = self.queue.get(next).copied() {
             next += 1;
-            let corners = self.mesh.corners(face as usize);
+            let corners = self.mesh.corners(face.index());
             area += area_within(corners, centre, radius);
             if area >= THIN * disk {
                 return None;
             }
-            for side in 0..3 {
-                let ends = [corners[side], corners[(side + 1) % 3]];
-                if on_segment(centre, ends).1 < radius * radius && !self.cross(face, side) {
+            for h in face.sides() {
+                let ends = [corners[h.side()], corners[h.next().side()]];
+                if on_segment(centre, ends).squared < radius * radius && !self.cross(h) {
                     return None;
                 }
             }
@@ -187,19 +185,18 @@ impl<'a> Search<'a> {
         Some(area / disk)
     }
 
-    fn reach(&mut self, face: u32) {
-        if self.seen.visit(face as usize) {
+    fn reach(&mut self, face: FaceId) {
+        if self.seen.visit(face.index()) {
             self.queue.push(face);
         }
     }
 
     /// Walks to the other side of an edge; not if it lies in another chart, or there is none.
-    fn cross(&mut self, face: u32, side: usize) -> bool {
-        let twin = self.mesh.edges().twin(HalfEdgeId::side_of(FaceId(face), side));
-        let same = |other: &u32| self.chart[*other as usize] == self.chart[face as usize];
-        let other = twin.map(|t| t.face().0).filter(same);
-        other.into_iter().for_each(|other| self.reach(other));
-        other.is_some()
+    fn cross(&mut self, h: HalfEdgeId) -> bool {
+        let chart = |h: HalfEdgeId| self.chart[h.face().index()];
+        let Some(twin) = self.mesh.edges().twin(h).filter(|twin| chart(*twin) == chart(h)) else { return false };
+        self.reach(twin.face());
+        true
     }
 }
 

@@ -1,14 +1,17 @@
 //! Surfaces: from a soup of triangles to a mesh with edges, orientation and intrinsic lengths.
 
+mod edit;
 mod intrinsic;
 mod outlier;
 mod soup;
 mod steps;
 mod surface;
 
+pub(crate) use edit::MeshEditor;
 pub use intrinsic::{Metric, TriangleShape};
 pub use outlier::ValueApart;
 pub use soup::{SoupError, TriangleSoup};
 pub use steps::{CoordinateSteps, FEW_STEPS};
 pub(crate) use surface::Patch;
 pub use surface::SurfaceMesh;
+pub(crate) use surface::{Sheets, SurfaceParts};

@@ -13,15 +13,36 @@ const EDGES_PER_DIAGONAL: f64 = 50.0;
 /// [`crate::repair()`].
 #[derive(Clone, Debug)]
 pub struct SurfaceMesh {
-    pub(crate) points: Vec<Vec3>,
-    pub(crate) triangles: Vec<[VertexId; 3]>,
-    pub(crate) source: Vec<u32>,
-    pub(crate) welded: Vec<u32>,
+    pub(super) points: Vec<Vec3>,
+    pub(super) triangles: Vec<[VertexId; 3]>,
+    pub(super) source: Vec<u32>,
+    pub(super) welded: Vec<u32>,
     /// Vertices from this one on are not of the input.
-    pub(crate) added_from: usize,
-    pub(crate) edges: EdgeTable,
-    pub(crate) census: Census,
-    pub(crate) metric: Metric,
+    pub(super) added_from: usize,
+    pub(super) edges: EdgeTable,
+    pub(super) census: Census,
+    pub(super) metric: Metric,
+}
+
+/// What a surface is made of. See [`SurfaceMesh`] for what must hold, and its methods for what each of these is.
+pub(crate) struct SurfaceParts {
+    pub points: Vec<Vec3>,
+    pub triangles: Vec<[VertexId; 3]>,
+    pub source: Vec<u32>,
+    pub welded: Vec<u32>,
+    pub added_from: usize,
+    pub edges: EdgeTable,
+    pub metric: Metric,
+}
+
+/// Where the sheets of a surface met before each was given vertices of its own: that is to become seams, and is counted for
+/// the surface still.
+#[derive(Clone, Copy)]
+pub(crate) struct Sheets {
+    /// Edges at which three or more triangles met.
+    pub nonmanifold_edges: usize,
+    /// Vertices at which a sheet touches others away from its boundary.
+    pub nonmanifold_vertices: usize,
 }
 
 /// What is known of a part of a surface beside its connectivity and its lengths.
@@ -40,6 +61,28 @@ pub(crate) struct Patch {
 }
 
 impl SurfaceMesh {
+    /// A surface of these parts, counted, unless its triangles are `counted` already.
+    pub(crate) fn new(parts: SurfaceParts, sheets: Sheets, counted: Option<Census>) -> Self {
+        let SurfaceParts { points, triangles, source, welded, added_from, edges, metric } = parts;
+        let counted = counted.unwrap_or_else(|| Census::new(&triangles, &edges));
+        let Sheets { nonmanifold_edges, nonmanifold_vertices } = sheets;
+        let census = Census { nonmanifold_edges, nonmanifold_vertices, ..counted };
+        Self { points, triangles, source, welded, added_from, edges, census, metric }
+    }
+
+    /// Checks what the surface knows of itself against what its triangles tell.
+    #[cfg(test)]
+    pub(crate) fn assert_sound(&self) {
+        let edges = EdgeTable::new(&self.triangles);
+        assert!(self.edges.iter().eq(edges.iter()), "edges");
+        let Census { nonmanifold_edges, nonmanifold_vertices, .. } = self.census;
+        let anew = Census { nonmanifold_edges, nonmanifold_vertices, ..Census::new(&self.triangles, &edges) };
+        assert_eq!(self.census, anew);
+        let faces = self.triangles.len();
+        assert_eq!((self.source.len(), self.metric.shapes.len(), self.metric.flagged.len()), (faces, faces, faces));
+        assert_eq!((self.welded.len(), self.census.vertices), (self.points.len(), self.points.len()));
+    }
+
     /// The positions of the vertices, in the unit of the input.
     pub fn points(&self) -> &[Vec3] {
         &self.points

@@ -20,7 +20,7 @@ mod sheets;
 mod t_junctions;
 pub(crate) mod weld;
 
-use crate::mesh::{Metric, SurfaceMesh, TriangleSoup};
+use crate::mesh::{Metric, Sheets, SurfaceMesh, SurfaceParts, TriangleSoup};
 use crate::topology::{Census, EdgeTable, Umbrellas};
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 use crate::vec3::{BoundingBox, Vec3, midpoint, unit_scale};
@@ -383,11 +383,10 @@ impl Draft {
         let nonmanifold_edges = edges.iter().filter(|(_, sides)| sides.len() > 2).count();
         let edges = renewed(edges, report.split_vertices.count > 0, &triangles);
         let nonmanifold_vertices = pinned_vertices(&welded, &triangles, &edges);
-        let known = known.filter(|_| report.split_vertices.count == 0).cloned();
-        let census = known.unwrap_or_else(|| Census::new(&triangles, &edges));
-        let census = Census { nonmanifold_edges, nonmanifold_vertices, ..census };
+        let counted = known.filter(|_| report.split_vertices.count == 0).cloned();
         let added_from = welded.partition_point(|w| (*w as usize) < input_points);
-        SurfaceMesh { points, triangles, source: self.source, welded, added_from, edges, census, metric }
+        let parts = SurfaceParts { points, triangles, source: self.source, welded, added_from, edges, metric };
+        SurfaceMesh::new(parts, Sheets { nonmanifold_edges, nonmanifold_vertices }, counted)
     }
 }
 

@@ -2,7 +2,9 @@ use super::*;
 use crate::shapes;
 
 fn repaired(soup: &TriangleSoup) -> Repaired {
-    repair(soup, &Settings::default()).expect("a surface is left")
+    let repaired = repair(soup, &Settings::default()).expect("a surface is left");
+    repaired.mesh.assert_sound();
+    repaired
 }
 
 /// Two triangles of a unit square, the second one moved by `gap`, as a soup with six points.

@@ -15,6 +15,7 @@ use super::{Defect, SurfaceDistance};
 use crate::certify::polygons::{self, Wrong};
 use crate::evaluate::{Plane, along_curve};
 use crate::grid::{GridPoint, orientation};
+use crate::topology::loops::closed_loops;
 use crate::topology::{ChartId, VertexId};
 use crate::vec3::{Vec3, bits_of, unit_scale};
 use std::borrow::Cow;
@@ -147,7 +148,7 @@ fn boundary_defect(mesh: &Mesh, chart: ChartId, open: &[[VertexId; 2]], in_plane
     })
 }
 
-/// Directed edges as closed loops. Each edge is taken once, so the walk ends.
+/// Directed edges as closed loops.
 ///
 /// # Errors
 /// A node that other than one edge leaves, or that none enters.
@@ -158,22 +159,10 @@ fn chained(open: &[[VertexId; 2]]) -> Result<Vec<Vec<VertexId>>, VertexId> {
             return Err(*from);
         }
     }
-    let mut loops = Vec::new();
-    for [start, _] in open {
-        let mut turn = Vec::new();
-        let mut at = *start;
-        while let Some(to) = next.remove(&at) {
-            turn.push(at);
-            at = to;
-        }
-        if !turn.is_empty() {
-            if at != *start {
-                return Err(at);
-            }
-            loops.push(turn);
-        }
-    }
-    Ok(loops)
+    closed_loops(open.iter().map(|[start, _]| *start), |from| {
+        let to = next.remove(&from)?;
+        Some((from, to))
+    })
 }
 
 /// The boundary of a chart in the plane, by its places in space.

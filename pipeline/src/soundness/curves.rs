@@ -7,7 +7,7 @@
 use super::Defect;
 use super::open::sides_of_one;
 use super::reference::{HandedOverAtlas, Mesh};
-use crate::evaluate::{Bvh, on_segment};
+use crate::evaluate::{Bvh, OnSegment, on_segment};
 use crate::topology::{ChartId, CurveId, VertexId};
 use crate::vec3::{BoundingBox, Vec3, distance};
 use std::collections::{BTreeMap, BTreeSet};
@@ -175,7 +175,7 @@ impl<'a> CurveSides<'a> {
         self.tree.overlapping(&around, |s| {
             let (curve, side) = self.sides[s as usize];
             let ends = [0, 1].map(|e| self.curves[curve as usize][side as usize + e]);
-            let (share, squared) = on_segment(x, ends);
+            let OnSegment { share, squared } = on_segment(x, ends);
             let found = (squared, OnCurve { curve, side, share });
             // Of equally near sides the first one: the order of visits does not matter.
             let is_better = |b: &(f64, OnCurve)| squared < b.0 || (squared == b.0 && side < b.1.side);

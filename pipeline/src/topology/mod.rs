@@ -6,8 +6,11 @@
 
 mod census;
 pub(crate) mod csr;
+pub(crate) mod dijkstra;
 mod edges;
 mod id;
+pub(crate) mod loops;
+pub(crate) mod partition;
 mod stars;
 pub(crate) mod union_find;
 mod visits;
