@@ -57,6 +57,7 @@
 //! optimiser and a certificate of its own.
 
 pub mod atlas;
+pub mod certified;
 pub mod certify;
 pub mod decompose;
 pub mod evaluate;
@@ -77,7 +78,7 @@ pub mod topology;
 pub mod untangle;
 pub mod vec3;
 
-pub use atlas::{CertifiedAtlas, CertifiedChart};
+pub use certified::{CertifiedAtlas, CertifiedChart};
 pub use decompose::decompose;
 pub use parametrize::{ChartError, ChartJob, Error, MapError, MappedChart, Plan, parametrize, parametrize_surface};
 pub use repair::repair;

@@ -2,7 +2,8 @@
 
 use crate::formats::gmsh;
 use crate::report::ExportReport;
-use planish_core::atlas::{Chart, NARROW};
+use planish_core::atlas::Chart;
+use planish_core::certified::NARROW;
 use planish_core::evaluate::Plane;
 use planish_core::map::natural::{Natural, natural};
 use planish_core::measure::distortion::Summary;

@@ -1,7 +1,8 @@
 //! One chart through the stages: linear map, quadratic map, untangling, certificate.
 
 use super::cut::{Attempt, Cutter};
-use crate::atlas::{CertifiedChart, Chart, Harmonic, LinearSummary, Provenance};
+use crate::atlas::Chart;
+use crate::certified::{CertifiedChart, Harmonic, LinearSummary, Provenance};
 use crate::certify::{self, CertifiedMap, PlanarMap, prove};
 use crate::decompose;
 use crate::fem::sparse;

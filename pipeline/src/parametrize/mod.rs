@@ -11,7 +11,7 @@
 mod cut;
 mod job;
 
-use crate::atlas::{CertifiedAtlas, GatherError};
+use crate::certified::{CertifiedAtlas, GatherError};
 use crate::decompose::{self, Illegal, decompose, split_ears};
 use crate::mesh::{SurfaceMesh, TriangleSoup};
 use crate::monitor::{Interrupted, Monitor};

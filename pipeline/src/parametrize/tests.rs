@@ -1,5 +1,6 @@
 use super::*;
-use crate::atlas::{CertifiedChart, Chart};
+use crate::atlas::Chart;
+use crate::certified::CertifiedChart;
 use crate::map::natural;
 use crate::monitor::NoMonitor;
 use crate::settings::{ChartSettings, Order};

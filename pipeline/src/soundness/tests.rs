@@ -1,5 +1,5 @@
 use super::*;
-use crate::atlas::CertifiedAtlas;
+use crate::certified::CertifiedAtlas;
 use crate::parametrize::parametrize_chart;
 use crate::seams::tests::{labelled, sector};
 use crate::subdivide::subdivide;

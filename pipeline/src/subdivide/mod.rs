@@ -22,7 +22,8 @@ mod nodes;
 mod normals;
 mod refine;
 
-use crate::atlas::{CertifiedAtlas, Chart};
+use crate::atlas::Chart;
+use crate::certified::CertifiedAtlas;
 use crate::certify::{CertifiedMap, PlanarMap, StraightMap, parts, polygons, prove};
 use crate::grid::{GridPoint, orientation};
 use crate::measure::curvature::Principal;

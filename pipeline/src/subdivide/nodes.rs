@@ -1,6 +1,7 @@
 //! The nodes that the charts of a surface share: vertices, middles of edges, and middles of parts of these.
 
-use crate::atlas::{CertifiedAtlas, Chart};
+use crate::atlas::Chart;
+use crate::certified::CertifiedAtlas;
 use crate::measure::curvature::{self, Principal};
 use crate::mesh::SurfaceMesh;
 use crate::seams::Curve;

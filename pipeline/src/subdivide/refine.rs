@@ -17,7 +17,7 @@
 
 use super::nodes::{Nodes, on_surface};
 use super::{Inverted, LinearChart};
-use crate::atlas::{CertifiedAtlas, CertifiedChart};
+use crate::certified::{CertifiedAtlas, CertifiedChart};
 use crate::certify::PlanarMap;
 use crate::grid::{GridPoint, orientation};
 use crate::mesh::SurfaceMesh;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::atlas::CertifiedChart;
+use crate::certified::CertifiedChart;
 use crate::certify::{PlanarMap, prove};
 use crate::mesh::TriangleSoup;
 use crate::parametrize::parametrize_chart;

@@ -1,6 +1,9 @@
 //! Charts with their certified maps, and the atlas that they make.
+//!
+//! A [`CertifiedChart`] owns a chart, its certified map, how that was found, and how it distorts. A [`CertifiedAtlas`] owns the
+//! surface, its certified charts, and the curves between them. They are what meshers, viewers and reports are made from.
 
-use super::Chart;
+use crate::atlas::Chart;
 use crate::certify::CertifiedMap;
 use crate::fem::sparse;
 use crate::map::linear;

@@ -1,4 +1,7 @@
-//! Charts: parts of a surface that a disk can carry.
+//! Charts, and the atlas that they make.
+//!
+//! A [`Chart`] is a part of a surface that a disk, perhaps with holes, can carry, and a value of its own: it has its
+//! points, its triangles and its lengths, so that it can be mapped where the surface is not.
 
 use crate::mesh::{Metric, Patch, SurfaceMesh, TriangleShape};
 use crate::topology::{ChartId, EdgeTable, FaceId, HalfEdgeId, VertexId};
