@@ -105,27 +105,27 @@ pub fn param(views: &[ChartView]) -> Result<Vec<u8>, VtuError> {
 
 /// The position of a node in space: that of a vertex, or the middle of a straight edge.
 fn position(view: &ChartView, node: usize) -> [f64; 3] {
-    let place = |v: planish_core::topology::VertexId| view.mesh.points()[view.chart.vertices()[v.index()].index()];
+    let location = |v: planish_core::topology::VertexId| view.mesh.points()[view.chart.vertices()[v.index()].index()];
     let vertices = view.chart.vertices().len();
     if node < vertices {
         return view.mesh.points()[view.chart.vertices()[node].index()];
     }
     let h = view.chart.edges().sides(planish_core::topology::EdgeId::at(node - vertices))[0];
-    midpoint(place(view.chart.from(h)), place(view.chart.from(h.next())))
+    midpoint(location(view.chart.from(h)), location(view.chart.from(h.next())))
 }
 
-/// Writes all charts as one piece; `place` gives the position of a node from view, index of the chart, node, uv.
+/// Writes all charts as one piece; `location` gives the position of a node from view, index of the chart, node, uv.
 fn encode(
     views: &[ChartView],
     title: &str,
-    place: impl Fn(&ChartView, usize, usize, [f64; 2]) -> [f64; 3],
+    location: impl Fn(&ChartView, usize, usize, [f64; 2]) -> [f64; 3],
 ) -> Result<Vec<u8>, VtuError> {
     let mut points: Vec<f64> = Vec::new();
     let mut connectivity: Vec<u64> = Vec::new();
     for (index, view) in views.iter().enumerate() {
         let base = points.len() as u64 / 3;
         for (node, p) in view.map.map().nodes.iter().enumerate() {
-            points.extend(place(view, index, node, p.uv()));
+            points.extend(location(view, index, node, p.uv()));
         }
         connectivity.extend(view.map.map().cells.iter().flatten().map(|n| base + u64::from(*n)));
     }
