@@ -88,9 +88,8 @@ fn heights_of_no_data_are_named() {
     assert!(ended.err.contains("z is -9999 at 16 vertices"), "{}", ended.err);
 }
 
-#[test]
-fn faces_of_all_tetrahedra_are_refused_at_once() {
-    let n = 16;
+/// The faces of all tetrahedra in a grid of n cubes each way, six in each.
+fn faces_of_tetrahedra(n: u32) -> Vec<Triangle> {
     let mut faces = BTreeSet::new();
     for cube in (0..n * n * n).map(|i| [i % n, i / n % n, i / n / n]) {
         for [x, y] in [[0, 1], [0, 2], [1, 0], [1, 2], [2, 0], [2, 1]] {
@@ -102,7 +101,12 @@ fn faces_of_all_tetrahedra_are_refused_at_once() {
             faces.extend([[a, b, c], [a, b, d], [a, c, d], [b, c, d]]);
         }
     }
-    let faces: Vec<Triangle> = faces.into_iter().map(|t| t.map(|p: [u32; 3]| p.map(f64::from))).collect();
+    faces.into_iter().map(|t| t.map(|p: [u32; 3]| p.map(f64::from))).collect()
+}
+
+#[test]
+fn faces_of_all_tetrahedra_are_refused_at_once() {
+    let faces = faces_of_tetrahedra(16);
     let (out, inputs) = (Out::new(), tempfile::tempdir().expect("a folder"));
     let (ended, report) = out.run_bytes("tetrahedra.stl", &stl(&faces));
     let reason = report.reason.expect("refused");
@@ -114,4 +118,43 @@ fn faces_of_all_tetrahedra_are_refused_at_once() {
     let told: Value = serde_json::from_str(&told.out).expect("JSON");
     assert_eq!(told["reason"]["code"], "volume_elements");
     assert_eq!(told["surface"]["raw"]["nonmanifold_edges"], 30_928);
+}
+
+/// A terrain of 60 by 60 squares, and far from it the faces of all tetrahedra of a block.
+pub fn terrain_beside_a_volume() -> (Vec<u8>, usize, usize) {
+    let surface = terrain([0.0; 2], hills);
+    let block = faces_of_tetrahedra(8);
+    let far = |t: &Triangle| t.map(|[x, y, z]| [x - 500.0, y, z]);
+    let all: Vec<Triangle> = surface.iter().copied().chain(block.iter().map(far)).collect();
+    (stl(&all), surface.len(), block.len())
+}
+
+#[test]
+fn a_component_that_cannot_be_processed_is_refused_alone() {
+    let (bytes, of_surface, of_block) = terrain_beside_a_volume();
+    let (out, inputs) = (Out::new(), tempfile::tempdir().expect("a folder"));
+    let (ended, report) = out.run_bytes("mixed.stl", &bytes);
+    assert_eq!((ended.code, report.status, &report.reason), (Some(1), Status::Certified, &None), "{}", ended.err);
+    let [refused] = &report.refused_components[..] else { panic!("{:?}", report.refused_components) };
+    assert_eq!((refused.component, refused.triangles, refused.first_triangle as usize), (1, of_block, of_surface));
+    assert_eq!(refused.reason.code, Code::VolumeElements);
+    assert!(ended.err.contains("component 1 is refused") && ended.err.contains("export the boundary"), "{}", ended.err);
+    let published: usize = report.charts.iter().map(|c| c.triangles).sum();
+    assert!((of_surface..of_surface + 10).contains(&published), "the others, and halves of ears: {published}");
+    // The result is proven again, and is no less than it says.
+    let folder = out.of("mixed.stl");
+    assert_eq!(planish(["check".as_ref(), folder.as_os_str()]).code, Some(0));
+    // Alone, the surface gets the same charts.
+    let (_, alone) = out.run_bytes("alone.stl", &stl(&terrain([0.0; 2], hills)));
+    let sizes = |r: &Report| r.charts.iter().map(|c| c.triangles).collect::<Vec<_>>();
+    assert_eq!(sizes(&alone), sizes(&report));
+    // It is told beforehand, too.
+    let path = inputs.path().join("mixed.stl");
+    std::fs::write(&path, &bytes).expect("written");
+    let told = planish(["info".as_ref(), path.as_os_str(), "--json".as_ref()]);
+    assert_eq!(told.code, Some(1));
+    let told: Value = serde_json::from_str(&told.out).expect("JSON");
+    assert_eq!((&told["reason"], &told["refused_components"][0]["triangles"]), (&Value::Null, &of_block.into()));
+    let for_people = planish(["info".as_ref(), path.as_os_str()]).out;
+    assert!(for_people.contains(&format!("component 1 of {of_block} triangles")), "{for_people}");
 }

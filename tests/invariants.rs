@@ -2,35 +2,23 @@
 
 use crate::fixtures::{ALL, generate};
 use planish::formats::{self, Kind};
-use planish_core::atlas::Chart;
-use planish_core::measure::distortion;
 use planish_core::mesh::TriangleSoup;
 use planish_core::monitor::NoMonitor;
-use planish_core::{CertifiedChart, Order, decompose, finish_or_split, map_or_split, repair};
+use planish_core::{CertifiedChart, Settings, decompose, parametrize};
 
 /// The largest area ratio: enough for the bent disk to stay whole, so that its energies can be compared.
 const MAX_AREA_RATIO: f64 = 1e7;
 
 /// The certified charts of a soup.
 fn charts(soup: &TriangleSoup) -> Vec<CertifiedChart> {
-    let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-    let settings = decompose::Settings { max_area_ratio: MAX_AREA_RATIO, feature_angle: None, ..Default::default() };
-    let atlas = decompose(&mesh, &settings, &NoMonitor).expect("an atlas");
-    let parts = |chart| map_or_split(&mesh, chart, Order::Quadratic, &settings, &NoMonitor).expect("maps");
-    let finished = |(chart, mapped)| {
-        finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings, &NoMonitor)
-            .expect("maps")
-            .into_iter()
-            .map(within_bound)
-    };
-    atlas.into_charts().into_iter().flat_map(parts).flat_map(finished).collect()
-}
-
-/// The map of a chart, which keeps what the settings promise.
-fn within_bound((chart, done): (Chart, CertifiedChart)) -> CertifiedChart {
-    let ratio = distortion::area_ratio(&chart, &done.certified);
-    assert!(ratio <= MAX_AREA_RATIO || chart.triangles().len() == 1, "{ratio}");
-    done
+    let decompose =
+        decompose::Settings { max_area_ratio: MAX_AREA_RATIO, feature_angle: None, ..decompose::Settings::default() };
+    let atlas = parametrize(soup, &Settings { decompose, ..Settings::default() }, &NoMonitor).expect("an atlas");
+    for certified in atlas.charts() {
+        let ratio = certified.distortion().area_ratio;
+        assert!(ratio <= MAX_AREA_RATIO || certified.chart().triangles().len() == 1, "{ratio}");
+    }
+    atlas.charts().to_vec()
 }
 
 fn moved(soup: &TriangleSoup, f: impl Fn([f64; 3]) -> [f64; 3]) -> TriangleSoup {
@@ -74,17 +62,14 @@ fn charts_and_energies_stay() {
             // Where there is a choice of charts, ties are decided by numbers.
             let ([got], [reference]) = (&got[..], &reference[..]) else { continue };
             let energies = |c: &CertifiedChart| {
-                let report = c.untangle.clone().expect("quadratic");
+                let report = c.provenance().untangle.clone().expect("quadratic");
                 (report.energy_harmonic, report.energy)
             };
             let ((harmonic, energy), (h, e)) = (energies(got), energies(reference));
             assert!((harmonic / h - 1.0).abs() < 1e-6, "{name} {how}: harmonic {harmonic}, {h}");
             // Minimisers of a problem that is not convex may differ, but not by much.
             assert!((energy / e - 1.0).abs() < 1e-2, "{name} {how}: {energy}, {e}");
-            assert_eq!(
-                got.certified.certificate().hole_centres.len(),
-                reference.certified.certificate().hole_centres.len()
-            );
+            assert_eq!(got.map().certificate().hole_centres.len(), reference.map().certificate().hole_centres.len());
         }
     }
 }

@@ -11,6 +11,21 @@ pub const UNITS: f64 = 9_007_199_254_740_992.0;
 const LIMIT: i64 = 1 << 54;
 
 /// A point of the parametric plane, in units of 2^-53.
+///
+/// # Example
+///
+/// ```
+/// use planish_core::grid::{GridPoint, orientation};
+///
+/// let (p, q) = (GridPoint::vertex([0.1, 0.7]), GridPoint::vertex([0.3, -0.2]));
+/// // Not 0.1, but the nearest multiple of 2^-52; which a double holds, so that it is written as it is proven.
+/// assert!((p.uv()[0] - 0.1).abs() < 1.2e-16);
+/// assert_eq!(GridPoint::exact(p.uv()), Some(p));
+/// // Midpoints are exact, and so is every decision: moved by one unit, the middle lies left of the edge.
+/// let middle = p.midpoint(q);
+/// assert_eq!(orientation(p, q, middle), 0);
+/// assert!(orientation(p, q, GridPoint { x: middle.x + 1, ..middle }) > 0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct GridPoint {
     /// First coordinate, in units of 2^-53.

@@ -1,58 +1,63 @@
 //! The core of planish: from a soup of triangles to quadratic maps that are proven to be one-to-one.
 //!
-//! The story, in stage order:
-//!
-//! 1. [`repair()`] turns a soup into a [`mesh::SurfaceMesh`]: welded, oriented, with mollified edge lengths.
-//! 2. [`decompose()`] cuts the surface into [`atlas::Chart`]s: parts that a disk, perhaps with holes, can carry.
-//! 3. [`map_chart`] makes the [`linear`](map::linear) map, which does not fold, and the harmonic [`quadratic`](map::quadratic) map, whose curved
-//!    triangles may be invalid.
-//! 4. [`finish_chart`] makes them valid ([`mod@untangle`]) while keeping the Dirichlet energy as low as it can be, and
-//!    proves the result one-to-one ([`certify`]). Charts whose maps stretch too much are split, before it
-//!    ([`map_or_split`]; there charts that no mesher could follow are cut, too) or, where only the result shows it, after
-//!    it ([`finish_or_split`]).
-//! 5. [`measure`] tells what came out; [`seams`] finds the curves between charts.
-//! 6. [`mod@subdivide`] makes linear triangulations of certified maps, for meshers.
-//!
-//! # What is promised
-//!
-//! A [`certify::CertifiedMap`] is one-to-one: decided in exact integer arithmetic on the numbers that it holds,
-//! not up to a tolerance. Whatever survives decomposition gets one, unless its map needs triangles below the
-//! resolution of doubles; then the error says so. Results depend on nothing but the arguments: there is no clock,
-//! no thread, no random number and no file in this crate.
-//!
-//! # Cancelling, taking turns, and memory
-//!
-//! Whatever can take long asks a [`monitor::Monitor`] many times a second whether to go on, and reserves memory from it before
-//! it factorises. [`monitor::NoMonitor`] always goes on.
-//!
-//! # What is not
-//!
-//! The map is a local minimiser of the energy, within the maps whose jacobians have positive Bernstein coefficients.
-//!
-//! The method is that of *Surface reparametrization using quadratic finite elements* (Beaufort and co-workers),
-//! with an optimiser and a certificate of its own.
-//!
-//! # Example
+//! A poor surface triangulation (a scan, a segmentation, a terrain, a CAD export) is cut into charts, and each chart is
+//! mapped to a disk, perhaps with holes, by quadratic finite elements. What comes out is a [`CertifiedAtlas`]: its maps are
+//! one-to-one, proven in exact integer arithmetic on the numbers that it holds.
 //!
 //! ```
 //! use planish_core::monitor::NoMonitor;
-//! use planish_core::{Order, decompose, finish_chart, map_chart, repair, shapes};
+//! use planish_core::{Settings, parametrize, shapes};
 //!
-//! let soup = shapes::disk(8);
-//! let surface = repair(&soup, &Default::default())?.mesh;
-//! let atlas = decompose(&surface, &Default::default(), &NoMonitor)?;
-//! for chart in atlas.charts() {
-//!     let done = finish_chart(map_chart(chart, Order::Quadratic)?);
-//!     let certificate = done.certified.certificate();
-//!     assert_eq!(certificate.by_bounds + certificate.by_exact, chart.triangles().len());
-//!     assert!(certificate.det_lower_bound > 0.0);
+//! let soup = shapes::ring_torus(24, 12);
+//! let atlas = parametrize(&soup, &Settings::default(), &NoMonitor)?;
+//! for certified in atlas.charts() {
+//!     let proof = certified.map().certificate();
+//!     assert_eq!(proof.by_bounds + proof.by_exact, certified.chart().triangles().len());
+//!     assert!(proof.det_lower_bound > 0.0 && certified.distortion().area_ratio <= 1e6);
 //! }
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! assert!(atlas.seams().curves().len() >= 2, "a torus is no disk: its charts meet along curves");
+//! # Ok::<(), planish_core::Error>(())
 //! ```
+//!
+//! # The story
+//!
+//! [`parametrize()`] goes all the way; each step can be taken on its own.
+//!
+//! 1. [`repair()`] turns a [`TriangleSoup`](mesh::TriangleSoup) into a [`SurfaceMesh`](mesh::SurfaceMesh): welded, oriented,
+//!    with mollified edge lengths.
+//! 2. [`Plan::new`] cuts the surface into [`Chart`](atlas::Chart)s ([`decompose()`]): parts that a disk, perhaps with holes,
+//!    can carry. Each becomes a [`ChartJob`], which needs nothing but itself.
+//! 3. [`ChartJob::map`] makes the [`linear`](map::linear) map, which does not fold, and the harmonic
+//!    [`quadratic`](map::quadratic) map, whose curved triangles may be invalid. Charts that one map does not suit are split.
+//! 4. [`MappedChart::untangle`] makes the triangles valid ([`mod@untangle`]) while keeping the Dirichlet energy as low as it can
+//!    be, and proves the result one-to-one ([`certify`]): a [`CertifiedChart`].
+//! 5. [`CertifiedAtlas::gather`] puts the charts together, and finds the [curves](seams) between them.
+//! 6. [`mod@subdivide`] makes linear triangulations of an atlas, for meshers; [`evaluate`] goes from space to the plane and back;
+//!    [`soundness`] tells whether a mesh that was made through them is any good.
+//!
+//! # What is promised
+//!
+//! * A [`CertifiedMap`](certify::CertifiedMap) is one-to-one: decided exactly, not up to a tolerance. Only
+//!   [`certify::prove`] makes one, and nothing else reaches a [`CertifiedChart`].
+//! * Whatever survives decomposition gets a map, unless a single triangle needs more than the resolution of doubles; then
+//!   the error says so.
+//! * Results depend on nothing but the arguments: there is no clock, no thread, no random number and no file in this crate.
+//! * Whatever can take long asks a [`Monitor`](monitor::Monitor) many times a second whether to continue, and reserves
+//!   memory from it before it factorises. What was interrupted has no value.
+//!
+//! # What is not
+//!
+//! * The map is a local minimiser of the energy, within the maps whose jacobians have positive Bernstein coefficients: a
+//!   better one may exist.
+//! * Triangles are flat in space, so far, and boundaries of maps round.
+//!
+//! # Source
+//!
+//! The method is that of *Surface reparametrization using quadratic finite elements* (Beaufort and co-workers), with an
+//! optimiser and a certificate of its own.
 
 pub mod atlas;
 pub mod certify;
-mod chart_map;
 pub mod decompose;
 pub mod evaluate;
 pub mod fem;
@@ -61,8 +66,10 @@ pub mod map;
 pub mod measure;
 pub mod mesh;
 pub mod monitor;
+pub mod parametrize;
 pub mod repair;
 pub mod seams;
+mod settings;
 pub mod shapes;
 pub mod soundness;
 pub mod subdivide;
@@ -70,10 +77,9 @@ pub mod topology;
 pub mod untangle;
 pub mod vec3;
 
-pub use chart_map::{
-    CertifiedChart, Harmonic, MapError, MappedChart, Order, SplitError, finish_chart, finish_or_split, map_chart,
-    map_or_split, map_within,
-};
+pub use atlas::{CertifiedAtlas, CertifiedChart};
 pub use decompose::decompose;
+pub use parametrize::{ChartError, ChartJob, Error, MapError, MappedChart, Plan, parametrize, parametrize_surface};
 pub use repair::repair;
+pub use settings::{ChartSettings, Order, Settings};
 pub use subdivide::subdivide;

@@ -108,11 +108,11 @@ mod tests {
     use crate::certify::PlanarMap;
     use crate::fem::sparse::{self, Pattern, solve_general};
     use crate::map::boundary::{Boundary, Mids};
-    use crate::map::closed::ClosedChart;
+    use crate::map::filled::FilledChart;
     use crate::map::linear::mean_value_map;
     use crate::mesh::{SurfaceMesh, TriangleSoup};
     use crate::topology::FaceId;
-    use crate::{Order, SplitError, decompose, finish_or_split, map_or_split, repair, shapes};
+    use crate::{Error, Settings, decompose, parametrize_surface, repair, shapes};
     use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
 
@@ -157,38 +157,35 @@ mod tests {
         repair(soup, &Default::default()).expect("a surface").mesh
     }
 
-    fn whole(mesh: &SurfaceMesh) -> ClosedChart {
+    fn whole(mesh: &SurfaceMesh) -> FilledChart {
         let labels = vec![0; mesh.triangles().len()];
-        ClosedChart::new(&decompose::assemble(mesh, &labels).expect("one chart").charts()[0])
+        FilledChart::new(&decompose::assemble(mesh, &labels).expect("one chart").charts()[0])
     }
 
     /// Per chart its triangles and its map.
     type Maps = Vec<(Vec<FaceId>, PlanarMap)>;
 
     /// The whole story.
-    fn maps(mesh: &SurfaceMesh, settings: &decompose::Settings, monitor: &dyn Monitor) -> Result<Maps, SplitError> {
-        let mut all = Vec::new();
-        for chart in decompose(mesh, settings, monitor)?.into_charts() {
-            for (chart, mapped) in map_or_split(mesh, chart, Order::Quadratic, settings, monitor)? {
-                let done = finish_or_split(mesh, chart, mapped, Order::Quadratic, settings, monitor)?;
-                all.extend(done.into_iter().map(|(c, d)| (c.faces().to_vec(), d.certified.map().clone())));
-            }
-        }
-        Ok(all)
+    fn maps(mesh: &SurfaceMesh, settings: &Settings, monitor: &dyn Monitor) -> Result<Maps, Error> {
+        let atlas = parametrize_surface(mesh.clone(), settings, monitor)?;
+        Ok(atlas.charts().iter().map(|c| (c.chart().faces().to_vec(), c.map().map().clone())).collect())
     }
 
     #[test]
     fn whatever_is_interrupted_ends_as_that_and_whatever_is_not_does_not_depend_on_the_monitor() {
-        let ratio =
-            |max_area_ratio: f64| decompose::Settings { max_area_ratio, feature_angle: None, ..Default::default() };
+        let of_charts = |decompose| Settings { decompose, ..Settings::default() };
+        let ratio = |max_area_ratio: f64| {
+            of_charts(decompose::Settings { max_area_ratio, feature_angle: None, ..Default::default() })
+        };
+        let disks = decompose::Settings { strict_disks: true, ..ratio(30.0).decompose };
         for (soup, settings) in [
             (shapes::ring_torus(30, 16), ratio(1e6)),
-            (shapes::sphere(20), decompose::Settings { strict_disks: true, ..ratio(30.0) }),
+            (shapes::sphere(20), of_charts(disks)),
             // Split and untangled; at the higher ratio split after that.
             (shapes::bent_disk(20, 0.45, 1.0), ratio(1e3)),
             (shapes::bent_disk(32, 0.45, 1.0), ratio(5e5)),
             // With factors that are no small ones.
-            (shapes::disk_with_holes(49, 3), decompose::Settings::default()),
+            (shapes::disk_with_holes(49, 3), Settings::default()),
             // The feasible path.
             (shapes::folding_six(), ratio(1e6)),
         ] {
@@ -201,7 +198,7 @@ mod tests {
             for patience in (0..asked).step_by(asked.div_ceil(6)).chain([asked - 1]) {
                 let monitor = Watchful::new(patience);
                 let got = maps(&mesh, &settings, &monitor);
-                assert!(matches!(got, Err(SplitError::Interrupted(_))), "after {patience} of {asked} answers");
+                assert!(matches!(got, Err(Error::Interrupted(_))), "after {patience} of {asked} answers");
                 monitor.most();
             }
             assert!(maps(&mesh, &settings, &Watchful::new(asked)).expect("maps") == wanted);
@@ -223,7 +220,7 @@ mod tests {
                     assert!(monitor.reserved.load(Relaxed) as usize >= 8 * analysis.factor_entries());
                     drop(factor);
                 }
-                Err(error) => assert_eq!(error, sparse::Error::Singular { unknowns: 2 }),
+                Err(error) => assert_eq!(error, sparse::Unsolvable::Singular { unknowns: 2 }.into()),
             }
             assert!(monitor.most() >= 8 * analysis.factor_entries());
             let broken = catch_unwind(AssertUnwindSafe(|| {

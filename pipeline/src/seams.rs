@@ -18,6 +18,7 @@ pub(crate) use distance::segment_distance;
 
 use crate::atlas::Chart;
 use crate::mesh::SurfaceMesh;
+use crate::topology::csr::Csr;
 use crate::topology::{ChartId, CurveId, HalfEdgeId, VertexId};
 use crate::vec3::distance;
 
@@ -115,7 +116,8 @@ impl Curve {
 impl SeamNetwork {
     /// Finds the curves of `charts`, which are those of an atlas of `mesh`, in order. Corners at which an edge of the shape
     /// turns sharply are taken if they are no nearer than `spacing` (in the unit of the input) to others along the curve.
-    pub fn new(mesh: &SurfaceMesh, charts: &[Chart], spacing: f64) -> Self {
+    pub fn new<C: AsRef<Chart>>(mesh: &SurfaceMesh, charts: &[C], spacing: f64) -> Self {
+        let charts: &[&Chart] = &charts.iter().map(AsRef::as_ref).collect::<Vec<_>>();
         let boundary = Boundary::new(mesh, charts);
         let mut corner = boundary.corners();
         kinks::mark(mesh, charts, &boundary, spacing, &mut corner);
@@ -201,13 +203,13 @@ struct Boundary {
     /// The segment of each step.
     segment_of: Vec<u32>,
     /// The steps of each segment, ascending.
-    by_segment: Vec<Vec<u32>>,
+    by_segment: Csr<u32>,
     /// All welded vertices are below this.
     welded: usize,
 }
 
 impl Boundary {
-    fn new(mesh: &SurfaceMesh, charts: &[Chart]) -> Self {
+    fn new(mesh: &SurfaceMesh, charts: &[&Chart]) -> Self {
         let mut steps = Vec::new();
         let mut loops = Vec::new();
         for chart in charts {
@@ -225,16 +227,16 @@ impl Boundary {
     }
 
     fn charts(&self, segment: u32) -> impl Iterator<Item = ChartId> {
-        self.by_segment[segment as usize].iter().map(|s| self.steps[*s as usize].chart)
+        self.by_segment.row(segment as usize).iter().map(|s| self.steps[*s as usize].chart)
     }
 
     /// Per welded vertex, whether it is a corner.
     fn corners(&self) -> Vec<bool> {
-        let ends = |(segment, steps): (u32, &Vec<u32>)| {
+        let ends = |(segment, steps): (u32, &[u32])| {
             let (low, high) = self.steps[steps[0] as usize].key();
             [(low, segment), (high, segment)]
         };
-        let mut ends: Vec<(u32, u32)> = (0..).zip(&self.by_segment).flat_map(ends).collect();
+        let mut ends: Vec<(u32, u32)> = (0..).zip(self.by_segment.rows()).flat_map(ends).collect();
         ends.sort_unstable();
         let mut corner = vec![false; self.welded];
         for at in ends.chunk_by(|a, b| a.0 == b.0) {
@@ -258,14 +260,14 @@ fn step(mesh: &SurfaceMesh, chart: &Chart, h: HalfEdgeId) -> Step {
 }
 
 /// Per step its segment, and per segment its steps.
-fn segments(steps: &[Step]) -> (Vec<u32>, Vec<Vec<u32>>) {
+fn segments(steps: &[Step]) -> (Vec<u32>, Csr<u32>) {
     let mut order: Vec<((u32, u32), u32)> = steps.iter().map(Step::key).zip(0..).collect();
     order.sort_unstable();
     let mut segment_of = vec![0; steps.len()];
-    let mut by_segment = Vec::new();
+    let mut by_segment = Csr::with_capacity(steps.len());
     for same in order.chunk_by(|a, b| a.0 == b.0) {
         same.iter().for_each(|(_, s)| segment_of[*s as usize] = by_segment.len() as u32);
-        by_segment.push(same.iter().map(|(_, s)| *s).collect());
+        by_segment.push_row(same.iter().map(|(_, s)| *s));
     }
     (segment_of, by_segment)
 }

@@ -5,12 +5,12 @@ use planish_core::certify::{PlanarMap, prove};
 use planish_core::fem::bernstein;
 use planish_core::grid::GridPoint;
 use planish_core::map::boundary::{Boundary, Mids};
-use planish_core::map::closed::ClosedChart;
-use planish_core::map::linear::{self, Method, folded, harmonic_places, linear_map, mean_value_map};
+use planish_core::map::filled::FilledChart;
+use planish_core::map::linear::{self, Method, folded, harmonic_uv, linear_map, mean_value_map};
 use planish_core::map::quadratic::{QuadraticMap, quadratic_map};
 use planish_core::mesh::TriangleSoup;
 use planish_core::monitor::NoMonitor;
-use planish_core::untangle::untangle;
+use planish_core::untangle::{Dirichlet, untangle};
 use planish_core::vec3::{Vec3, distance};
 use planish_core::{decompose, repair, shapes};
 use std::f64::consts::TAU;
@@ -19,19 +19,19 @@ const TOLERANCE: f64 = 1e-8;
 
 /// An example: its chart, and the places of its boundary vertices by vertex.
 struct Example {
-    chart: ClosedChart,
+    chart: FilledChart,
     places: Vec<[f64; 2]>,
 }
 
-fn closed(soup: &TriangleSoup) -> ClosedChart {
+fn filled(soup: &TriangleSoup) -> FilledChart {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-    ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
+    FilledChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
 }
 
 /// F5 with its boundary on the corners of a square.
 fn f5() -> Example {
     let places = vec![[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
-    Example { chart: closed(&shapes::floater_five()), places }
+    Example { chart: filled(&shapes::floater_five()), places }
 }
 
 /// Vertex 0 in the middle, the others around it, on the circle by chord length from vertex 1 on.
@@ -45,7 +45,7 @@ fn star(soup: &TriangleSoup) -> Example {
     };
     let unused: [f64; 2] = [0.0; 2];
     let places = std::iter::once(unused).chain((0..ring.len()).map(on_circle)).collect();
-    Example { chart: closed(soup), places }
+    Example { chart: filled(soup), places }
 }
 
 impl Example {
@@ -70,9 +70,9 @@ impl Example {
         (t[1][0] - t[0][0]) * (t[2][1] - t[0][1]) - (t[1][1] - t[0][1]) * (t[2][0] - t[0][0])
     }
 
-    fn least_det(&self, map: &[GridPoint], vertices: [u32; 3]) -> f64 {
+    fn min_det(&self, map: &[GridPoint], vertices: [u32; 3]) -> f64 {
         let nodes = self.chart.nodes(self.face(vertices)).map(|n| map[n]);
-        bernstein::range(bernstein::ExactDet::new(nodes).coefficients()).0
+        bernstein::range(bernstein::JacobianBezier::new(nodes).coefficients()).min
     }
 
     fn quadratic(&self, mids: Mids) -> QuadraticMap {
@@ -82,17 +82,18 @@ impl Example {
     /// The harmonic linear map folds, both repaired ones do not, and the quadratic one ends certified.
     fn passes_all_states(&self) {
         let boundary = self.boundary(Mids::Chord);
-        assert_eq!(folded(&self.chart, &harmonic_places(&self.chart, &boundary, &NoMonitor).expect("solves")).len(), 1);
+        assert_eq!(folded(&self.chart, &harmonic_uv(&self.chart, &boundary, &NoMonitor).expect("solves")).len(), 1);
         let m_matrix = linear_map(&self.chart, &boundary, &NoMonitor).expect("maps");
         assert_eq!((m_matrix.method(), m_matrix.folded()), (Method::MMatrix, 1));
         for mids in [Mids::Chord, Mids::Arc] {
             let mut boundary = self.boundary(mids);
-            linear::lower_ears(&self.chart, &m_matrix, &mut boundary);
+            linear::flatten_ear_arcs(&self.chart, &m_matrix, &mut boundary);
             assert_eq!(boundary, self.boundary(mids), "these examples have no ears");
-            let start = m_matrix.raised(&self.chart, &boundary);
+            let start = m_matrix.degree_elevated(&self.chart, &boundary);
             let harmonic = self.quadratic(mids);
             assert!(!harmonic.invalid().is_empty());
-            let got = untangle(&self.chart, &start, &harmonic, &NoMonitor);
+            let got = untangle(&self.chart, &Dirichlet::new(self.chart.shapes()), &start, &harmonic, &NoMonitor)
+                .expect("ends");
             assert!(got.report.energy < got.report.energy_start && got.report.energy > got.report.energy_harmonic);
             let cells = (0..self.chart.triangles().len()).map(|f| self.chart.nodes(f).map(|n| n as u32)).collect();
             let proven = prove(PlanarMap { cells, nodes: got.nodes, hole_centres: got.hole_centres });
@@ -114,15 +115,15 @@ fn close2(got: GridPoint, want: [f64; 2]) {
 fn f5_in_every_state() {
     let example = f5();
     let boundary = example.boundary(Mids::Chord);
-    let cotangent = harmonic_places(&example.chart, &boundary, &NoMonitor).expect("solves");
+    let cotangent = harmonic_uv(&example.chart, &boundary, &NoMonitor).expect("solves");
     close2(cotangent[4], [-85.0 / 207.0, -128.0 / 207.0]);
     close(example.doubled_area(&cotangent, [4, 2, 3]), -2.0 / 69.0);
     let mean_value = mean_value_map(&example.chart, &boundary, &NoMonitor).expect("maps");
-    close2(mean_value.places()[4], [-0.321944758, -0.553011927]);
+    close2(mean_value.uv()[4], [-0.321944758, -0.553011927]);
     let chords = example.quadratic(Mids::Chord);
-    close(example.least_det(chords.nodes(), [4, 2, 3]), -0.049704693);
-    close(example.least_det(chords.nodes(), [4, 1, 2]), -0.625447349);
-    close(example.least_det(example.quadratic(Mids::Arc).nodes(), [4, 1, 2]), -0.315548120);
+    close(example.min_det(chords.nodes(), [4, 2, 3]), -0.049704693);
+    close(example.min_det(chords.nodes(), [4, 1, 2]), -0.625447349);
+    close(example.min_det(example.quadratic(Mids::Arc).nodes(), [4, 1, 2]), -0.315548120);
     example.passes_all_states();
 }
 
@@ -130,15 +131,12 @@ fn f5_in_every_state() {
 fn t4_in_every_state() {
     let example = star(&shapes::folding_three());
     let boundary = example.boundary(Mids::Chord);
-    let cotangent = harmonic_places(&example.chart, &boundary, &NoMonitor).expect("solves");
+    let cotangent = harmonic_uv(&example.chart, &boundary, &NoMonitor).expect("solves");
     close2(cotangent[0], [-0.478019341, 0.824687131]);
     close(example.doubled_area(&cotangent, [0, 2, 3]), -0.17014829);
-    close2(
-        mean_value_map(&example.chart, &boundary, &NoMonitor).expect("maps").places()[0],
-        [-0.281751830, 0.398289848],
-    );
-    close(example.least_det(example.quadratic(Mids::Chord).nodes(), [0, 2, 3]), -0.041042086);
-    close(example.least_det(example.quadratic(Mids::Arc).nodes(), [0, 2, 3]), -0.071451738);
+    close2(mean_value_map(&example.chart, &boundary, &NoMonitor).expect("maps").uv()[0], [-0.281751830, 0.398289848]);
+    close(example.min_det(example.quadratic(Mids::Chord).nodes(), [0, 2, 3]), -0.041042086);
+    close(example.min_det(example.quadratic(Mids::Arc).nodes(), [0, 2, 3]), -0.071451738);
     example.passes_all_states();
 }
 
@@ -146,18 +144,15 @@ fn t4_in_every_state() {
 fn p6_in_every_state() {
     let example = star(&shapes::folding_six());
     let boundary = example.boundary(Mids::Chord);
-    let cotangent = harmonic_places(&example.chart, &boundary, &NoMonitor).expect("solves");
+    let cotangent = harmonic_uv(&example.chart, &boundary, &NoMonitor).expect("solves");
     close2(cotangent[0], [-0.805064845, 0.403552024]);
     // Vertices 1 to 6 are the ring (8,1) (6,5) (2,9) (1,5) (-7,-3) (-1,-5).
     close(example.doubled_area(&cotangent, [0, 4, 5]), -0.29409754);
-    close2(
-        mean_value_map(&example.chart, &boundary, &NoMonitor).expect("maps").places()[0],
-        [-0.128596522, -0.106231255],
-    );
-    close(example.least_det(example.quadratic(Mids::Chord).nodes(), [0, 3, 4]), -0.212699827);
+    close2(mean_value_map(&example.chart, &boundary, &NoMonitor).expect("maps").uv()[0], [-0.128596522, -0.106231255]);
+    close(example.min_det(example.quadratic(Mids::Chord).nodes(), [0, 3, 4]), -0.212699827);
     let arcs = example.quadratic(Mids::Arc);
-    close(example.least_det(arcs.nodes(), [0, 2, 3]), -0.017853576);
-    close(example.least_det(arcs.nodes(), [0, 3, 4]), -0.062498685);
+    close(example.min_det(arcs.nodes(), [0, 2, 3]), -0.017853576);
+    close(example.min_det(arcs.nodes(), [0, 3, 4]), -0.062498685);
     example.passes_all_states();
 }
 
@@ -193,7 +188,7 @@ fn maps_do_not_depend_on_unit_place_or_numbering() {
 fn radii(soup: &TriangleSoup) -> Vec<f64> {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
     let chart =
-        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
+        FilledChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
     let map = quadratic_map(&chart, &Boundary::circle(&chart, Mids::Arc), &NoMonitor).expect("solves");
     let mut radii = vec![-1.0; soup.points().len()];
     for v in 0..mesh.points().len() {

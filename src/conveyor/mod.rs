@@ -35,7 +35,7 @@ use crate::input::job::Job;
 use crate::outcome::{Abort, Status};
 use crate::output::begun::Begun;
 use crate::output::publish::{PublishError, Publisher};
-use crate::report::{Facts, Report, SurfaceFacts};
+use crate::report::{Decomposition, Facts, Report, SurfaceFacts};
 use crate::settings::Settings;
 use crate::stages;
 use apart::parent::Parent;
@@ -45,10 +45,9 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use grants::{Grants, Own};
 use in_flight::{InFlight, Shared};
 use parking_lot::RwLock;
-use planish_core::MappedChart;
-use planish_core::atlas::Chart;
 use planish_core::mesh::TriangleSoup;
 use planish_core::monitor::Monitor;
+use planish_core::{CertifiedChart, ChartJob, MappedChart, Plan};
 use progress::Running;
 use queue::Queue;
 use reading::Next;
@@ -257,14 +256,14 @@ struct Soup {
 struct Cut {
     surface: Arc<Surface>,
     part_index: PartIndex,
-    chart: Chart,
+    job: ChartJob,
 }
 
 /// What untangling gets.
 struct Mapped {
     surface: Arc<Surface>,
     part_index: PartIndex,
-    mapped: (Chart, MappedChart),
+    mapped: MappedChart,
 }
 
 /// What writing gets.
@@ -294,24 +293,29 @@ fn cut(Soup { in_flight, mut facts, soup }: Soup, charts: &Sender<Cut>, finished
         drop(soup);
         let surface = facts.surface.insert(SurfaceFacts::of(&found));
         surface.warnings.iter().for_each(|warning| tracing::warn!("{}", warning.message));
-        let cut = stages::cut(found, &in_flight.settings, monitor)?;
-        surface.decomposition = Some(cut.decomposition);
-        Ok(cut)
+        let (plan, refused) = stages::plan(found, &in_flight.settings, monitor)?;
+        surface.refused = refused;
+        surface.decomposition = Some(Decomposition {
+            feature_edges: plan.feature_edges,
+            ears_split: plan.ears_split,
+            ..Decomposition::default()
+        });
+        Ok(plan)
     });
     match cut {
         Err(why) => hand_on(finished, Finished::Abort(in_flight, Box::new(facts), why)),
-        Ok(stages::Cut { mesh, charts: parts, .. }) => {
-            let surface = Surface::new(in_flight, mesh, parts.len(), facts);
-            for (i, chart) in parts.into_iter().enumerate() {
-                hand_on(charts, Cut { surface: surface.clone(), part_index: (i, 0), chart });
+        Ok(Plan { mesh, jobs, .. }) => {
+            let surface = Surface::new(in_flight, mesh, jobs.len(), facts);
+            for (i, job) in jobs.into_iter().enumerate() {
+                hand_on(charts, Cut { surface: surface.clone(), part_index: (i, 0), job });
             }
         }
     }
 }
 
-fn map(Cut { surface, part_index, chart }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
+fn map(Cut { surface, part_index, job }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
     let in_flight = &surface.in_flight;
-    let work = |monitor: &dyn Monitor| stages::map(&surface.mesh, chart, &in_flight.settings, monitor);
+    let work = |monitor: &dyn Monitor| stages::map(job, monitor);
     let parts = if surface.is_pending(part_index) { in_flight.compute(Stage::Map, work) } else { Err(Abort::Unwanted) };
     match parts {
         Err(why) => complete_part(surface, part_index, Err(why), finished),
@@ -326,7 +330,7 @@ fn map(Cut { surface, part_index, chart }: Cut, untangle: &Sender<Mapped>, finis
 
 fn untangle(Mapped { surface, part_index, mapped }: Mapped, finished: &Sender<Finished>) {
     let in_flight = &surface.in_flight;
-    let work = |monitor: &dyn Monitor| stages::untangle(&surface.mesh, mapped, &in_flight.settings, monitor);
+    let work = |monitor: &dyn Monitor| stages::untangle(mapped, monitor);
     let part =
         if surface.is_pending(part_index) { in_flight.compute(Stage::Untangle, work) } else { Err(Abort::Unwanted) };
     complete_part(surface, part_index, part, finished);
@@ -335,7 +339,7 @@ fn untangle(Mapped { surface, part_index, mapped }: Mapped, finished: &Sender<Fi
 fn complete_part(
     surface: Arc<Surface>,
     part_index: PartIndex,
-    part: Result<Vec<(Chart, planish_core::CertifiedChart)>, Abort>,
+    part: Result<Vec<CertifiedChart>, Abort>,
     finished: &Sender<Finished>,
 ) {
     if surface.complete_part(part_index, part) {

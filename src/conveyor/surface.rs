@@ -5,7 +5,6 @@ use crate::outcome::Abort;
 use crate::report::Facts;
 use parking_lot::Mutex;
 use planish_core::CertifiedChart;
-use planish_core::atlas::Chart;
 use planish_core::mesh::SurfaceMesh;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,16 +15,16 @@ pub(super) type PartIndex = (usize, usize);
 /// A surface that was cut into charts.
 pub(super) struct Surface {
     pub in_flight: Arc<InFlight>,
-    pub mesh: SurfaceMesh,
     /// How many charts decomposition made.
     pub whole: usize,
     parts: Mutex<Parts>,
 }
 
 struct Parts {
+    mesh: Option<SurfaceMesh>,
     facts: Facts,
     missing: usize,
-    done: BTreeMap<PartIndex, Vec<(Chart, CertifiedChart)>>,
+    done: BTreeMap<PartIndex, Vec<CertifiedChart>>,
     stopped: Option<(PartIndex, Abort)>,
 }
 
@@ -33,8 +32,8 @@ impl Surface {
     /// A surface of which no chart is mapped yet.
     pub fn new(in_flight: Arc<InFlight>, mesh: SurfaceMesh, whole: usize, facts: Facts) -> Arc<Self> {
         in_flight.shared.progress.update(in_flight.number, |job| job.charts = whole);
-        let parts = Parts { facts, missing: whole, done: BTreeMap::new(), stopped: None };
-        Arc::new(Self { in_flight, mesh, whole, parts: Mutex::new(parts) })
+        let parts = Parts { mesh: Some(mesh), facts, missing: whole, done: BTreeMap::new(), stopped: None };
+        Arc::new(Self { in_flight, whole, parts: Mutex::new(parts) })
     }
 
     /// Whether the part at `part_index` is still to be done. Where one of several parts stops the job, it is always the first
@@ -50,7 +49,7 @@ impl Surface {
     }
 
     /// A part is done, or stopped. Whether it was the last one.
-    pub fn complete_part(&self, part_index: PartIndex, part: Result<Vec<(Chart, CertifiedChart)>, Abort>) -> bool {
+    pub fn complete_part(&self, part_index: PartIndex, part: Result<Vec<CertifiedChart>, Abort>) -> bool {
         self.in_flight.shared.progress.update(self.in_flight.number, |job| job.charts_done += 1);
         let mut parts = self.parts.lock();
         match part {
@@ -64,11 +63,16 @@ impl Surface {
         parts.missing == 0
     }
 
-    /// What is known so far, and all charts in order, or why there are not all.
-    pub fn collect(&self) -> (Facts, Result<Vec<(Chart, CertifiedChart)>, Abort>) {
+    /// What is known so far, and the surface with all charts in order, or why there are not all. Once: nothing is left here.
+    pub fn collect(&self) -> (Facts, Result<(SurfaceMesh, Vec<CertifiedChart>), Abort>) {
         let mut parts = self.parts.lock();
         let done = std::mem::take(&mut parts.done).into_values().flatten().collect();
-        (parts.facts.clone(), parts.stopped.take().map_or(Ok(done), |(_, why)| Err(why)))
+        let collected = match (parts.stopped.take(), parts.mesh.take()) {
+            (None, Some(mesh)) => Ok((mesh, done)),
+            (Some((_, why)), _) => Err(why),
+            (None, None) => Err(Abort::Unwanted),
+        };
+        (parts.facts.clone(), collected)
     }
 }
 

@@ -72,9 +72,10 @@ pub(super) fn write(finished: Finished, after: &After) {
         Finished::Surface(surface) => {
             let (facts, done) = surface.collect();
             let in_flight = surface.in_flight.clone();
-            let assembled = in_flight.compute(Stage::Write, |_| {
-                let mut report = facts.clone().report(&in_flight.settings);
-                let files = stages::assemble(&surface.mesh, done?, surface.whole, &in_flight.settings, &mut report)?;
+            let assembled = in_flight.compute(Stage::Write, |monitor| {
+                let (mesh, charts) = done?;
+                let (certified, files) = stages::assemble(mesh, charts, surface.whole, &in_flight.settings, monitor)?;
+                let report = facts.clone().certified(&in_flight.settings, certified);
                 Ok((report, not_too_large(files, &in_flight)?))
             });
             (in_flight, facts, assembled)

@@ -2,22 +2,18 @@
 
 use crate::formats::gmsh;
 use crate::report::ExportReport;
-use planish_core::CertifiedChart;
-use planish_core::atlas::Chart;
+use planish_core::atlas::{Chart, NARROW};
 use planish_core::evaluate::Plane;
 use planish_core::map::natural::{Natural, natural};
 use planish_core::measure::distortion::Summary;
 use planish_core::measure::spikes::spikes;
-use planish_core::mesh::SurfaceMesh;
-use planish_core::monitor::NoMonitor;
+use planish_core::monitor::{Interrupted, Monitor};
 use planish_core::seams::{Curve, Passage, SeamNetwork};
 use planish_core::subdivide::{self, LinearAtlas, subdivide};
 use planish_core::topology::{ChartId, FaceId};
 use planish_core::vec3::unit_scale;
+use planish_core::{CertifiedAtlas, CertifiedChart};
 use std::collections::BTreeMap;
-
-/// Gmsh gets at least this many edges along the diagonal of the bounding box, unless another size is asked for.
-const EDGES_PER_DIAGONAL: f64 = 50.0;
 
 /// Maps whose conformal distortion exceeds this on a hundredth of their area are left to MeshAdapt: the other algorithms
 /// of Gmsh measure lengths by the map at one point, and miss whole parts of a surface where that changes from triangle to
@@ -34,10 +30,6 @@ const QUICK: f64 = 4_500.0;
 
 /// The largest area ratio of such a chart: MeshAdapt cuts off what a map shrinks (gebco_seabed, at 5e4).
 const EVEN: f64 = 100.0;
-
-/// A place is narrow if it is narrower than this share of an edge: elements are as small there. Corners of the shape that are
-/// nearer together are not all kept, as they would make narrow places.
-pub const NARROW: f64 = 0.75;
 
 /// Every loop of a chart gets at least so many edges.
 const EDGES_PER_LOOP: f64 = 8.0;
@@ -73,31 +65,27 @@ pub struct Export {
     pub report: ExportReport,
 }
 
-/// Hands charts with their certified maps to Gmsh, for triangles with edges of length `size` (see
-/// [`default_size`]). `distortions` tells how much each map stretches. Warns where Gmsh would do badly; a hand-off that
-/// fails is told and leaves the maps as they are.
-pub fn gmsh(
-    mesh: &SurfaceMesh,
-    charts: &[Chart],
-    maps: &[CertifiedChart],
-    distortions: &[Summary],
-    network: &SeamNetwork,
-    size: f64,
-) -> Export {
+/// Hands an atlas to Gmsh, for triangles with edges of length `size`. Warns where Gmsh would do badly; a hand-off that fails
+/// is told and leaves the maps as they are.
+///
+/// # Errors
+/// [`Interrupted`].
+pub fn gmsh(atlas: &CertifiedAtlas, size: f64, monitor: &dyn Monitor) -> Result<Export, Interrupted> {
+    let (mesh, charts, network) = (atlas.mesh(), atlas.charts(), atlas.seams());
     let shortest_seam_distance = network.shortest_distance(mesh);
     let mut report = ExportReport { size, shortest_seam_distance, ..ExportReport::default() };
     report.warning = shortest_seam_distance.filter(|d| size > 0.5 * d).map(|d| too_coarse(size, d));
-    let natural = natural_maps(mesh, charts, distortions);
+    let natural = natural_maps(charts, monitor)?;
     let straight: Vec<_> = natural.iter().map(|n| n.as_ref().map(|n| &n.map)).collect();
-    let linear = match subdivide(mesh, charts, maps, &straight, network) {
+    let linear = match subdivide(atlas, &straight) {
         Ok(linear) => linear,
         Err(error) => {
-            let failure = failure(&error, mesh, charts);
+            let failure = failure(&error, charts);
             tracing::warn!("no hand-off to Gmsh: {failure}");
-            return Export { files: vec![], report: ExportReport { failure: Some(failure), ..report } };
+            return Ok(Export { files: vec![], report: ExportReport { failure: Some(failure), ..report } });
         }
     };
-    let mut distortions = distortions.to_vec();
+    let mut distortions: Vec<Summary> = charts.iter().map(|c| *c.distortion()).collect();
     for chart in linear.straight_charts().iter().map(|c| c.index()) {
         distortions[chart] = natural[chart].as_ref().map_or(distortions[chart], |n| n.distortion);
     }
@@ -115,21 +103,24 @@ pub fn gmsh(
     }
     let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
     let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow, spikes };
-    Export { files: files(charts, &linear, network, &script), report }
+    Ok(Export { files: files(atlas, &linear, &script), report })
 }
 
 /// Maps with a boundary of their own for the charts whose maps stretch, where these do less.
-fn natural_maps(mesh: &SurfaceMesh, charts: &[Chart], distortions: &[Summary]) -> Vec<Option<Natural>> {
-    let of_chart = |(chart, on_disk): (&Chart, &Summary)| {
-        let p99 = on_disk.conformal_p99;
-        (p99 > BENT).then(|| natural(mesh, chart, p99, &NoMonitor)).flatten()
+fn natural_maps(charts: &[CertifiedChart], monitor: &dyn Monitor) -> Result<Vec<Option<Natural>>, Interrupted> {
+    let of_chart = |certified: &CertifiedChart| {
+        let p99 = certified.distortion().conformal_p99;
+        if p99 <= BENT {
+            return Ok(None);
+        }
+        natural(certified.chart(), p99, monitor)
     };
-    charts.iter().zip(distortions).map(of_chart).collect()
+    charts.iter().map(of_chart).collect()
 }
 
 /// The curves along narrow places and the small charts, by the size of elements there: half of `size`, a quarter, and so on.
 /// `adapted` are the charts that MeshAdapt makes, ascending.
-fn narrow(charts: &[Chart], network: &SeamNetwork, adapted: &[usize], size: f64) -> Vec<gmsh::Narrow> {
+fn narrow(charts: &[CertifiedChart], network: &SeamNetwork, adapted: &[usize], size: f64) -> Vec<gmsh::Narrow> {
     let halved = |n: u32| gmsh::Narrow { size: size * 0.5_f64.powi(n as i32), ..gmsh::Narrow::default() };
     let mut found: Vec<gmsh::Narrow> = (1..=gmsh::Narrow::HALVINGS).map(halved).collect();
     let class = |wanted: f64| {
@@ -142,7 +133,7 @@ fn narrow(charts: &[Chart], network: &SeamNetwork, adapted: &[usize], size: f64)
             found[class].longest = found[class].longest.max(curve.length());
         }
     }
-    for chart in charts {
+    for chart in charts.iter().map(CertifiedChart::chart) {
         let Extent { area, perimeter } = Extent::of(chart, network);
         if area > SMALL * size * size {
             continue;
@@ -189,10 +180,10 @@ impl Extent {
 ///
 /// Loops need a few edges each: Gmsh leaves charts with two nodes on their boundary out, and two charts with the same three
 /// nodes become the same triangle. A chart needs elements as small as it is wide, and a curve one edge.
-fn wanted_sizes(charts: &[Chart], network: &SeamNetwork) -> Vec<f64> {
+fn wanted_sizes(charts: &[CertifiedChart], network: &SeamNetwork) -> Vec<f64> {
     let mut wanted: Vec<f64> = network.curves().iter().map(Curve::length).collect();
     let sheets = sheets(charts.len(), network);
-    for chart in charts {
+    for chart in charts.iter().map(CertifiedChart::chart) {
         let across = if sheets[chart.id().index()] { ACROSS_SHEETS } else { ELEMENTS_ACROSS };
         let width = Extent::of(chart, network).width() / across;
         for turn in network.loops(chart.id()) {
@@ -224,10 +215,10 @@ fn sheets(charts: usize, network: &SeamNetwork) -> Vec<bool> {
 }
 
 /// MeshAdapt where maps stretch, in a unit in which it searches little more than a tenth of an edge around a point.
-fn algorithms(charts: &[Chart], linear: &LinearAtlas, distortions: &[Summary], size: f64) -> gmsh::Algorithms {
+fn algorithms(charts: &[CertifiedChart], linear: &LinearAtlas, distortions: &[Summary], size: f64) -> gmsh::Algorithms {
     let stretches = |c: usize| {
         let Summary { conformal_p99, area_ratio, .. } = distortions[c];
-        let is_quick = area_of(&charts[c]) < QUICK * size * size && area_ratio < EVEN;
+        let is_quick = area_of(charts[c].chart()) < QUICK * size * size && area_ratio < EVEN;
         let is_linear = linear.linear_charts().binary_search(&ChartId::at(c)).is_ok();
         let is_natural = linear.straight_charts().binary_search(&ChartId::at(c)).is_ok();
         is_linear || conformal_p99 > if is_quick && !is_natural { BENT } else { STRETCHED }
@@ -244,18 +235,11 @@ fn algorithms(charts: &[Chart], linear: &LinearAtlas, distortions: &[Summary], s
     gmsh::Algorithms { adapted, enlarged: if needed { 2.0 * unit_scale(size) } else { 1.0 } }
 }
 
-fn files(
-    charts: &[Chart],
-    linear: &LinearAtlas,
-    network: &SeamNetwork,
-    script: &gmsh::Script,
-) -> Vec<(String, Vec<u8>)> {
-    let mut files = vec![
-        (gmsh::ATLAS.to_owned(), gmsh::atlas(charts, linear, network)),
-        (gmsh::REMESH.to_owned(), gmsh::remesh(script)),
-    ];
+fn files(atlas: &CertifiedAtlas, linear: &LinearAtlas, script: &gmsh::Script) -> Vec<(String, Vec<u8>)> {
+    let mut files =
+        vec![(gmsh::ATLAS.to_owned(), gmsh::atlas(atlas, linear)), (gmsh::REMESH.to_owned(), gmsh::remesh(script))];
     let enlarged = Some(script.algorithms.enlarged).filter(|factor| *factor != 1.0);
-    files.extend(enlarged.map(|by| (gmsh::ENLARGED.to_owned(), gmsh::enlarged(linear, network, by))));
+    files.extend(enlarged.map(|by| (gmsh::ENLARGED.to_owned(), gmsh::enlarged(linear, atlas.seams(), by))));
     files
 }
 
@@ -270,15 +254,6 @@ fn counted(report: ExportReport, linear: &LinearAtlas, algorithms: &gmsh::Algori
         moved_vertices: linear.moved(),
         ..report
     }
-}
-
-/// The edge length of as many equilateral triangles of the same area, but at most a fiftieth of the diagonal of the
-/// bounding box. In the unit of the input.
-pub fn default_size(mesh: &SurfaceMesh) -> f64 {
-    let coarsest = mesh.bounding_box().diagonal() / EDGES_PER_DIAGONAL;
-    let share = mesh.area() / mesh.triangles().len() as f64;
-    let edge = (share * 4.0 / 3.0_f64.sqrt()).sqrt();
-    if edge > 0.0 { edge.min(coarsest) } else { coarsest }
 }
 
 /// What may go wrong, and what helps: an edge length only where it is one that `--size` takes.
@@ -304,11 +279,11 @@ fn too_coarse_for_spikes(size: f64, spikes: usize) -> String {
 }
 
 /// Why there is no hand-off, with a triangle by its number in the input.
-fn failure(error: &subdivide::Error, mesh: &SurfaceMesh, charts: &[Chart]) -> String {
+fn failure(error: &subdivide::Error, charts: &[CertifiedChart]) -> String {
     let source = |chart: &ChartId, face: &FaceId| {
-        let faces = charts.get(chart.index()).map(Chart::faces);
-        let face = faces.and_then(|f| f.get(face.index()));
-        face.map_or(String::new(), |f| format!(" (triangle {} of the input)", mesh.source_triangle(f.index())))
+        let chart = charts.get(chart.index()).map(CertifiedChart::chart);
+        let known = chart.filter(|c| face.index() < c.triangles().len());
+        known.map_or(String::new(), |c| format!(" (triangle {} of the input)", c.source_triangle(face.index())))
     };
     let place = match error {
         subdivide::Error::Inverted(i) => source(&i.chart, &i.face),

@@ -2,4 +2,4 @@
 
 mod gmsh;
 
-pub use gmsh::{Export, NARROW, default_size, gmsh};
+pub use gmsh::{Export, gmsh};

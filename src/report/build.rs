@@ -4,15 +4,14 @@ use super::{
     Boundary, Certificate, ChartReport, Counts, Distortion, Linear, Quadratic, RepairedSurface, Repairs, Seam, Seams,
     Surface, Untangle,
 };
-use planish_core::CertifiedChart;
 use planish_core::atlas::Chart;
 use planish_core::certify::{CertifiedMap, PlanarMap};
 use planish_core::map::linear;
-use planish_core::measure::distortion::{CellFields, Summary};
 use planish_core::repair::{self, Repaired};
 use planish_core::seams::{Curve, SeamNetwork};
 use planish_core::topology::Census;
 use planish_core::untangle;
+use planish_core::{CertifiedAtlas, CertifiedChart};
 
 /// The surface before and after repair.
 pub fn surface(repaired: &Repaired) -> Surface {
@@ -107,34 +106,36 @@ fn seams_of(chart: &Chart, network: &SeamNetwork) -> Vec<u32> {
     seams
 }
 
-/// A chart with its certified map.
-pub fn chart_report(
-    chart: &Chart,
-    network: &SeamNetwork,
-    done: &CertifiedChart,
-    fields: &[CellFields],
-    summary: &Summary,
-) -> ChartReport {
+/// The charts of an atlas.
+pub fn charts(atlas: &CertifiedAtlas) -> Vec<ChartReport> {
+    let colours = atlas.seams().colours();
+    atlas.charts().iter().zip(colours).map(|(certified, colour)| chart(certified, colour, atlas.seams())).collect()
+}
+
+fn chart(certified: &CertifiedChart, colour: u32, network: &SeamNetwork) -> ChartReport {
+    let chart = certified.chart();
+    let provenance = certified.provenance();
     let unit = chart.scale() * chart.scale();
-    let det_min = fields.iter().map(|f| f.det_min).fold(f64::MAX, f64::min);
+    let det_min = certified.fields().iter().map(|f| f.det_min).fold(f64::MAX, f64::min);
+    let summary = certified.distortion();
     ChartReport {
         id: chart.id().0,
         triangles: chart.triangles().len(),
         loops: 1 + chart.holes().len(),
-        colour: network.colours()[chart.id().index()],
+        colour,
         seams: seams_of(chart, network),
         neighbours: network.neighbours(chart.id()).iter().map(|c| c.0).collect(),
         linear: Linear {
-            folded: done.linear.folded(),
-            edges_changed: done.linear.edges_changed(),
-            method: linear_method(done.linear.method()).to_owned(),
+            folded: provenance.linear.folded,
+            edges_changed: provenance.linear.edges_changed,
+            method: linear_method(provenance.linear.method).to_owned(),
         },
-        quadratic: done.harmonic.as_ref().map(|h| Quadratic {
+        quadratic: provenance.harmonic.as_ref().map(|h| Quadratic {
             invalid: h.invalid.iter().filter(|i| **i).count(),
             det_min: (h.det_min * unit).clamp(f64::MIN, f64::MAX),
         }),
-        untangle: done.untangle.as_ref().map(|u| untangling(u, det_min)),
-        certificate: certificate(&done.certified),
+        untangle: provenance.untangle.as_ref().map(|u| untangling(u, det_min)),
+        certificate: certificate(certified.map()),
         distortion: Distortion {
             conformal_median: summary.conformal_median,
             conformal_p99: summary.conformal_p99,

@@ -1,9 +1,11 @@
 //! What is known of an input while it is on its way: values that stages add to, and of which the report is made once, at
 //! the end. So a report never holds what a stage that broke down has left behind.
 
-use super::{Decomposition, Input, Repairs, Report, Surface, Warning};
+use super::{
+    ChartReport, Decomposition, ExportReport, Input, Output, RefusedComponent, Repairs, Report, Seams, Surface, Warning,
+};
 use crate::formats::Notes;
-use crate::outcome::Reason;
+use crate::outcome::{Reason, Status};
 use crate::settings::Settings;
 use planish_core::repair::Repaired;
 
@@ -27,8 +29,25 @@ pub struct SurfaceFacts {
     pub repairs: Repairs,
     /// What it may suffer from all the same.
     pub warnings: Vec<Warning>,
+    /// The components of which no atlas is made.
+    pub refused: Vec<RefusedComponent>,
     /// How it was cut into charts; none where it was not.
     pub decomposition: Option<Decomposition>,
+}
+
+/// What is known of an atlas.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CertifiedFacts {
+    /// Its charts.
+    pub charts: Vec<ChartReport>,
+    /// How many of them there are more than decomposition made.
+    pub charts_by_splitting: usize,
+    /// The curves between them.
+    pub seams: Seams,
+    /// What was handed to a mesher; none where that was not asked for.
+    pub hand_off: Option<ExportReport>,
+    /// The files of the result.
+    pub outputs: Vec<Output>,
 }
 
 impl SurfaceFacts {
@@ -38,6 +57,7 @@ impl SurfaceFacts {
             surface: super::surface(found),
             repairs: super::repairs(&found.report),
             warnings: super::warnings(found),
+            refused: vec![],
             decomposition: None,
         }
     }
@@ -52,8 +72,18 @@ impl Facts {
     /// The report of an input for which there are no maps yet: all that is known, and no result.
     pub fn report(self, settings: &Settings) -> Report {
         let report = Report { content: self.content, ..Report::new(self.input, settings) };
-        let Some(SurfaceFacts { surface, repairs, warnings, decomposition }) = self.surface else { return report };
+        let Some(SurfaceFacts { surface, repairs, warnings, decomposition, .. }) = self.surface else { return report };
         Report { surface: Some(surface), repairs: Some(repairs), warnings, decomposition, ..report }
+    }
+
+    /// The report of an input that is certified, but for components that are refused.
+    pub fn certified(self, settings: &Settings, certified: CertifiedFacts) -> Report {
+        let refused_components = self.surface.as_ref().map_or(vec![], |s| s.refused.clone());
+        let CertifiedFacts { charts, charts_by_splitting, seams, hand_off, outputs } = certified;
+        let report = self.report(settings);
+        let decomposition = report.decomposition.clone().map(|d| Decomposition { charts_by_splitting, ..d });
+        let status = Status::Certified;
+        Report { status, refused_components, decomposition, charts, seams, hand_off, outputs, ..report }
     }
 
     /// The report of an input that is refused, or failed, for this reason.
@@ -65,7 +95,7 @@ impl Facts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::outcome::{Code, Status};
+    use crate::outcome::Code;
     use crate::settings::RawSettings;
     use planish_core::{repair, shapes};
 

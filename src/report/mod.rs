@@ -10,8 +10,8 @@ use crate::formats::Notes;
 use crate::outcome::{Reason, Status};
 use crate::settings::{self, Settings};
 use crate::system::escape::printable_json;
-pub use build::{certificate, chart_checksum, chart_report, repairs, seams, surface};
-pub use facts::{Facts, SurfaceFacts};
+pub use build::{certificate, chart_checksum, charts, repairs, seams, surface};
+pub use facts::{CertifiedFacts, Facts, SurfaceFacts};
 use planish_core::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -236,8 +236,13 @@ pub struct Decomposition {
 /// A component that was refused.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RefusedComponent {
-    /// Its number.
+    /// Its number: components are what is connected through edges, also those of three and more triangles, in the order of
+    /// their first triangles.
     pub component: usize,
+    /// Its triangles.
+    pub triangles: usize,
+    /// The position in the input of the first of them.
+    pub first_triangle: u32,
     /// Why.
     pub reason: Reason,
 }
@@ -445,6 +450,11 @@ impl Output {
 }
 
 impl Report {
+    /// Whether all of the input is certified: no component was refused.
+    pub fn is_whole(&self) -> bool {
+        self.status == Status::Certified && self.refused_components.is_empty()
+    }
+
     /// The report of an input about which nothing is known yet.
     pub fn new(input: Input, settings: &Settings) -> Self {
         Self {

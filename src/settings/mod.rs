@@ -157,13 +157,18 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// What decomposition must respect.
-    pub fn decompose(&self) -> planish_core::decompose::Settings {
-        planish_core::decompose::Settings {
-            max_area_ratio: self.max_area_ratio,
-            max_triangles: self.max_triangles.unwrap_or(usize::MAX),
-            strict_disks: self.strict_disks,
-            feature_angle: self.feature_angle,
+    /// What the core is to do.
+    pub fn core(&self) -> planish_core::Settings {
+        planish_core::Settings {
+            order: self.order,
+            repair: planish_core::repair::Settings { weld: self.weld },
+            decompose: planish_core::decompose::Settings {
+                max_area_ratio: self.max_area_ratio,
+                max_triangles: self.max_triangles.unwrap_or(usize::MAX),
+                strict_disks: self.strict_disks,
+                feature_angle: self.feature_angle,
+            },
+            size: self.size,
         }
     }
 }

@@ -5,9 +5,10 @@ use crate::formats::{Content, Notes};
 use crate::input::job::Job;
 use crate::input::{self, Folder, decode, read_input};
 use crate::outcome::Reason;
+use crate::report::RefusedComponent;
 use crate::report::{self, Counts, Repairs, Surface, Warning};
 use crate::settings::Settings;
-use crate::stages::{check_sheets, guard, repaired};
+use crate::stages::{guard, refused, repaired};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -19,6 +20,7 @@ struct Answer {
     surface: Option<Surface>,
     repairs: Option<Repairs>,
     warnings: Vec<Warning>,
+    refused_components: Vec<RefusedComponent>,
     reason: Option<Reason>,
 }
 
@@ -30,7 +32,7 @@ pub fn info(paths: &[PathBuf], json: bool, settings: &Settings) -> Result<Exit, 
     let mut exit = Exit::Success;
     for job in input::collect(paths)? {
         let answer = answer(&job, settings);
-        if answer.reason.is_some() {
+        if answer.reason.is_some() || !answer.refused_components.is_empty() {
             exit = Exit::Refused;
         }
         if json {
@@ -60,15 +62,30 @@ fn answer(job: &Job, settings: &Settings) -> Answer {
         repaired(&soup, settings)
     });
     match found {
-        Ok(found) => Answer {
-            surface: Some(report::surface(&found)),
-            repairs: Some(report::repairs(&found.report)),
-            warnings: report::warnings(&found),
+        Ok(found) => {
+            let (refused_components, reason) = match refused(&found) {
+                Ok(components) => (components, None),
+                Err(reason) => (vec![], Some(reason)),
+            };
+            Answer {
+                surface: Some(report::surface(&found)),
+                repairs: Some(report::repairs(&found.report)),
+                warnings: report::warnings(&found),
+                input,
+                content,
+                refused_components,
+                reason,
+            }
+        }
+        Err(reason) => Answer {
             input,
             content,
-            reason: check_sheets(&found).err(),
+            surface: None,
+            repairs: None,
+            warnings: vec![],
+            refused_components: vec![],
+            reason: Some(reason),
         },
-        Err(reason) => Answer { input, content, surface: None, repairs: None, warnings: vec![], reason: Some(reason) },
     }
 }
 
@@ -84,10 +101,20 @@ fn text(answer: &Answer, input: &Path) -> String {
         let [min, max] = surface.repaired.bbox;
         lines.push(format!("  area {:.6e}, box {min:?} to {max:?}", surface.repaired.area));
     }
+    lines.extend(answer.refused_components.iter().map(refused_component));
     lines.extend(answer.repairs.iter().flat_map(repairs));
     lines.extend(answer.warnings.iter().map(|w| format!("  warning  {}", w.message)));
     lines.extend(answer.content.iter().flat_map(|notes| &notes.remarks).map(|remark| format!("  {remark}")));
     lines.join("\n")
+}
+
+fn refused_component(refused: &RefusedComponent) -> String {
+    let RefusedComponent { component, triangles, first_triangle, reason } = refused;
+    let code = reason.code.name();
+    format!(
+        "  refused  component {component} of {triangles} triangles, from triangle {first_triangle} on: {} [{code}]",
+        reason.message
+    )
 }
 
 fn counts(title: &str, c: &Counts) -> String {

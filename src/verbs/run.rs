@@ -5,9 +5,8 @@ use crate::conveyor::Conveyor;
 use crate::conveyor::completion::{Done, End};
 use crate::input;
 use crate::input::job::Job;
-use crate::outcome::Status;
 use crate::output::publish::Publisher;
-use crate::report::Report;
+use crate::report::{RefusedComponent, Report};
 use crate::settings::Settings;
 use crate::system::orphans;
 use crate::watch::signals::{self, Hangup};
@@ -50,8 +49,9 @@ pub fn run(paths: &[PathBuf], settings: &Settings) -> Result<Exit, Box<dyn std::
         rows.iter().for_each(|(job, end)| tell_doubts(job, end));
         rows.iter().for_each(|(job, end)| tell_remarks(job, end));
     }
+    rows.iter().for_each(|(job, end)| tell_refused(job, end));
     rows.iter().for_each(|(job, end)| tell_trouble(job, end));
-    let is_good = |end: &End| matches!(end, End::Done(done) if done.report.status == Status::Certified);
+    let is_good = |end: &End| matches!(end, End::Done(done) if done.report.is_whole());
     Ok(if ends.iter().all(is_good) { Exit::Success } else { Exit::Refused })
 }
 
@@ -168,6 +168,19 @@ fn tell_trouble(job: &Job, end: &End) {
             eprint_line(&format!("{input}: {status}: {}{location} [{}]", reason.message, reason.code.name()));
         }
         End::Done(_) | End::Later(..) | End::Held(..) | End::Outdated(_) | End::Unwanted | End::Same => {}
+    }
+}
+
+/// Says on standard error which components of an input are not in its result.
+fn tell_refused(job: &Job, end: &End) {
+    let refused = end.standing().map_or(&[][..], |done| &done.report.refused_components);
+    for RefusedComponent { component, triangles, first_triangle, reason } in refused {
+        eprint_line(&format!(
+            "{}: component {component} is refused, of {triangles} triangles from triangle {first_triangle} on: {} [{}]",
+            escape(&job.path),
+            reason.message,
+            reason.code.name()
+        ));
     }
 }
 

@@ -217,3 +217,18 @@ fn what_somebody_has_open_for_writing_stays_until_it_is_closed() {
     w.wait_until("it is put away", |w| names(&w.inbox()).is_empty());
     w.stop();
 }
+
+#[test]
+fn an_input_of_which_a_component_was_refused_stays() {
+    let done = tempfile::tempdir().expect("a folder");
+    let mut w = Watched::new(&["--inputs", &format!("move:{}", done.path().display())]);
+    let (bytes, ..) = crate::doubts::terrain_beside_a_volume();
+    w.drop_in("mixed.stl", &bytes);
+    w.drop_in("whole.stl", &disk(4, 0.0));
+    w.start();
+    w.wait_for(&[("mixed.stl", &bytes)]);
+    w.wait_until("the other one is put away", |_| names(done.path()).contains("whole.stl"));
+    w.stop();
+    assert_eq!(names(&w.inbox()).into_iter().collect::<Vec<_>>(), ["mixed.stl"], "its result is not all of it");
+    assert_eq!(w.logged("mixed.stl", "component 1 is refused"), 1, "{}", w.log());
+}

@@ -63,8 +63,7 @@ fn write_labelled(
     let labels: Vec<u32> = (0..found.mesh.triangles().len()).map(|f| label(centre(f))).collect();
     let atlas = assemble(&found.mesh, &labels).expect("legal");
     let input = Input { name: "labelled".to_owned(), bytes: None, blake3: None, beside: vec![] };
-    let mut report = Report::new(input, settings);
-    let files = stages::finish(&found, atlas, settings, &mut report).expect("mapped");
+    let (report, files) = stages::finish(input, found, atlas, settings).expect("mapped");
     std::fs::create_dir_all(folder).expect("made");
     files.iter().for_each(|(name, content)| std::fs::write(folder.join(name), content).expect("written"));
     std::fs::write(folder.join("report.json"), report.to_json().expect("JSON")).expect("written");

@@ -25,7 +25,7 @@ impl Arc {
     }
 }
 
-pub(super) fn place(arc: &ArcNodes, nodes: &[GridPoint]) -> Arc {
+pub(super) fn arc_of(arc: &ArcNodes, nodes: &[GridPoint]) -> Arc {
     let [from, mid, to] = arc.map(|n| nodes[n as usize]);
     Arc { from, mid, to }
 }

@@ -1,7 +1,7 @@
 //! Premise (a): which triangles meet where, from the cells alone.
 
 use crate::topology::FaceId;
-use crate::topology::csr::Buckets;
+use crate::topology::csr::Csr;
 
 /// An arc of the boundary by its nodes: first vertex, middle, second vertex, with its triangle on the left.
 pub(super) type ArcNodes = [u32; 3];
@@ -114,10 +114,10 @@ fn all_sides(cells: &[[u32; 6]], nodes: usize) -> Vec<Side> {
         (a.min(b), Side { ends: [a.min(b), a.max(b)], forward: a < b, mid: cell[3 + k], cell: i })
     };
     let unsorted = || (0..).zip(cells).flat_map(|(i, c)| [0, 1, 2].map(|k| side(i, c, k)));
-    let mut at_lower_end = Buckets::new(nodes, unsorted);
+    let mut at_lower_end = Csr::sorted(nodes, unsorted);
     let mut sides = Vec::with_capacity(3 * cells.len());
     for node in 0..nodes {
-        let around = at_lower_end.get_mut(node);
+        let around = at_lower_end.row_mut(node);
         around.sort_unstable_by_key(|s| (s.ends[1], s.mid, s.forward, s.cell));
         sides.extend_from_slice(around);
     }

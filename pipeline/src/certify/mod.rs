@@ -23,7 +23,7 @@ pub(crate) mod polygons;
 mod star;
 mod straight;
 
-use crate::fem::bernstein::{ExactDet, Validity};
+use crate::fem::bernstein::{JacobianBezier, Validity};
 use crate::grid::GridPoint;
 use crate::topology::FaceId;
 pub use arcs::Arc;
@@ -136,6 +136,30 @@ pub enum Error {
 ///
 /// # Errors
 /// The first part of the theorem's premises that fails, with its evidence.
+///
+/// # Example
+///
+/// A square of two triangles from elsewhere, its boundary straight and around the origin.
+///
+/// ```
+/// use planish_core::certify::{Error, PlanarMap, prove};
+/// use planish_core::grid::GridPoint;
+///
+/// let [a, b, c, d] = [[0.5, 0.0], [0.0, 0.5], [-0.5, 0.0], [0.0, -0.5]].map(GridPoint::vertex);
+/// let middles = [a.midpoint(b), b.midpoint(c), c.midpoint(a), c.midpoint(d), d.midpoint(a)];
+/// let nodes = [vec![a, b, c, d], middles.to_vec()].concat();
+/// // Vertices, then the middles of the edges 01, 12, 20.
+/// let cells = vec![[0, 1, 2, 4, 5, 6], [0, 2, 3, 6, 7, 8]];
+/// let map = PlanarMap { cells, nodes, hole_centres: vec![] };
+/// let proven = prove(map.clone())?;
+/// assert_eq!(proven.certificate().outer_arcs, 4);
+///
+/// // The diagonal bent beyond a corner: one triangle folds.
+/// let mut folded = map;
+/// folded.nodes[6] = GridPoint::mid([0.0, 0.4]);
+/// assert!(matches!(prove(folded), Err(Error::InvalidTriangles { count: 1, .. })));
+/// # Ok::<(), Error>(())
+/// ```
 pub fn prove(map: PlanarMap) -> Result<CertifiedMap, Error> {
     let loops = incidence::boundary_loops(&map.cells, map.nodes.len())?;
     refuse_inexact(&map)?;
@@ -144,7 +168,7 @@ pub fn prove(map: PlanarMap) -> Result<CertifiedMap, Error> {
         return Err(Error::OffGrid { node });
     }
     let mut certificate = prove_triangles(&map)?;
-    let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| l.iter().map(|a| arcs::place(a, &map.nodes)).collect()).collect();
+    let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| l.iter().map(|a| arcs::arc_of(a, &map.nodes)).collect()).collect();
     let origin = GridPoint::default();
     let outer: Vec<usize> = (0..arcs.len()).filter(|i| arcs::winds_once(&arcs[*i], origin, 1)).collect();
     let [outer] = outer[..] else { return Err(Error::OuterLoop { count: outer.len(), loops: loops.len() }) };
@@ -181,16 +205,16 @@ fn prove_triangles(map: &PlanarMap) -> Result<Certificate, Error> {
     };
     let mut invalid = Vec::new();
     for (f, cell) in map.cells.iter().enumerate() {
-        let det = ExactDet::new(cell.map(|n| map.nodes[n as usize]));
+        let det = JacobianBezier::new(cell.map(|n| map.nodes[n as usize]));
         match det.validity() {
             Validity::ByBounds => certificate.by_bounds += 1,
             Validity::ByCopositivity => certificate.by_exact += 1,
             Validity::Invalid => invalid.push(FaceId::at(f)),
         }
-        let (bound, depth) = det.lower_bound();
-        certificate.depth = certificate.depth.max(depth);
+        let bound = det.lower_bound();
+        certificate.depth = certificate.depth.max(bound.depth);
         // A valid triangle has a positive determinant even where the bound of that depth is not.
-        certificate.det_lower_bound = certificate.det_lower_bound.min(bound.max(0.0));
+        certificate.det_lower_bound = certificate.det_lower_bound.min(bound.value.max(0.0));
     }
     match invalid.first() {
         Some(first) => Err(Error::InvalidTriangles { count: invalid.len(), first: *first, all: invalid }),

@@ -109,7 +109,7 @@ fn the_centre_of_a_star_is_found_where_there_is_one() {
     let centre = [0.1, 0.05];
     let map = ring(12, 0.4, centre);
     let loops = incidence::boundary_loops(&map.cells, map.nodes.len()).expect("sound");
-    let hole: Vec<Arc> = loops[1].iter().map(|a| arcs::place(a, &map.nodes)).collect();
+    let hole: Vec<Arc> = loops[1].iter().map(|a| arcs::arc_of(a, &map.nodes)).collect();
     let far = GridPoint::vertex([0.9, 0.0]);
     let found = star_centre(&hole, far).expect("a disk is star-shaped");
     assert!(arcs::winds_once(&hole, found, -1));

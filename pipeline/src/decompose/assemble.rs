@@ -82,8 +82,9 @@ fn chart(mesh: &SurfaceMesh, id: ChartId, faces: Vec<FaceId>, places: &mut Place
     let flagged = faces.iter().map(|f| mesh.metric().flagged[f.index()]).collect();
     let mut loops = boundary_loops(&triangles, &edges, vertices.len());
     let scale = mesh.metric().scale;
-    let mut chart =
-        Chart { id, vertices, faces, triangles, shapes, flagged, scale, edges, outer: vec![], holes: vec![] };
+    let patch = mesh.patch(&vertices, &faces);
+    let (outer, holes) = (vec![], vec![]);
+    let mut chart = Chart { id, vertices, faces, triangles, shapes, flagged, scale, edges, outer, holes, patch };
     let length = |l: &[HalfEdgeId]| l.iter().map(|h| chart.length(*h)).sum::<f64>();
     let lengths: Vec<f64> = loops.iter().map(|l| length(l)).collect();
     let longest = (0..loops.len()).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });

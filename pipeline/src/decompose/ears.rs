@@ -148,7 +148,8 @@ mod tests {
     use super::*;
     use crate::mesh::TriangleSoup;
     use crate::monitor::NoMonitor;
-    use crate::{Order, decompose, finish_chart, map_chart, repair};
+    use crate::parametrize::parametrize_chart;
+    use crate::{Order, decompose, repair};
 
     /// A square of n x n smaller ones, all cut along the same diagonal: two of its corners are ears.
     fn square(n: u32) -> TriangleSoup {
@@ -173,9 +174,9 @@ mod tests {
             let scale = mesh.metric().scale;
             assert!((shapes.sum::<f64>() / scale / scale / mesh.area() - 1.0).abs() < 1e-7, "mollified all the same");
             assert!(split_ears(&done.mesh, &done.atlas, usize::MAX).expect("legal").is_none(), "no ear is left");
-            let chart = &done.atlas.charts()[0];
-            let done = finish_chart(map_chart(chart, Order::Quadratic).expect("maps"));
-            assert!(done.certified.certificate().det_lower_bound > 0.0);
+            let chart = done.atlas.into_charts().remove(0);
+            let done = parametrize_chart(chart, Order::Quadratic).expect("maps");
+            assert!(done.map().certificate().det_lower_bound > 0.0);
         }
     }
 }

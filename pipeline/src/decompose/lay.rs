@@ -28,7 +28,7 @@ impl Network<'_> {
     /// the lifted seams put back (and `false`), where one of the charts `labels` would be illegal or too large, or
     /// smaller than half of what it was at first.
     pub(super) fn lay(&mut self, lifted: &[HalfEdgeId], paths: &[Path], labels: &[u32]) -> bool {
-        self.marks.now += 1;
+        self.claimed.clear();
         let added: Vec<HalfEdgeId> = paths.iter().flat_map(|p| p.half_edges.iter().copied()).collect();
         self.put_back(&added);
         let mut changed = Vec::new();
@@ -106,9 +106,9 @@ impl Network<'_> {
         stack: &mut Vec<FaceId>,
     ) -> bool {
         let had = self.labels[face.index()];
-        let claimed = std::mem::replace(&mut self.marks.faces[face.index()], self.marks.now) == self.marks.now;
+        let is_first = self.claimed.visit(face.index());
         if had != label {
-            if claimed || !labels.contains(&had) {
+            if !is_first || !labels.contains(&had) {
                 return false;
             }
             changed.push((face, self.relabel(face, label)));
@@ -144,18 +144,17 @@ impl Network<'_> {
     /// Walks along the boundary of a label. With I inner vertices, B boundary half-edges and F triangles the Euler
     /// number (of the label opened where it only touches itself) is I + (B - F)/2.
     fn shape(&mut self, label: u32, boundary: &[HalfEdgeId]) -> Shape {
-        self.marks.now += 1;
-        let now = self.marks.now;
+        self.seen_half_edges.clear();
+        self.seen_vertices.clear();
         let (faces, inside) = (self.sizes[label as usize], self.inside[label as usize]);
         let euler = inside as i64 + (boundary.len() as i64 - faces as i64) / 2;
         let mut shape = Shape { faces, euler, loops: 0, seam_loops: 0, pinches: 0, meets_itself: false };
         for start in boundary {
             let mut h = *start;
             let (mut fresh, mut seam) = (false, false);
-            while std::mem::replace(&mut self.marks.half_edges[h.index()], now) != now {
+            while self.seen_half_edges.visit(h.index()) {
                 (fresh, seam) = (true, seam || self.dual.across(h).is_some());
-                let again = std::mem::replace(&mut self.marks.vertices[self.dual.from(h)], now) == now;
-                shape.pinches += usize::from(again);
+                shape.pinches += usize::from(!self.seen_vertices.visit(self.dual.from(h)));
                 shape.meets_itself |= self.dual.foes(h).iter().any(|f| self.labels[f.index()] == label);
                 h = self.next(h, label);
             }

@@ -4,7 +4,12 @@
 //! the search have a few hundred unknowns, come by the hundred, and are parts of one graph, so that one order serves
 //! them all: ordering and analysing each anew would cost several times its factorisation.
 
+use crate::topology::csr::Csr;
+
 const NONE: u32 = u32::MAX;
+
+/// The strict lower triangle of a matrix by rows: columns and values, of which those in one place add up.
+type LowerRows = Csr<(u32, f64)>;
 
 /// A system that is put together from springs between unknowns, or between an unknown and a fixed place.
 pub(super) struct Springs {
@@ -33,39 +38,11 @@ impl Springs {
 
     /// Where the unknowns come to rest; none where the matrix is not positive definite in doubles.
     pub(super) fn rest(self) -> Option<Vec<[f64; 2]>> {
-        let rows = Rows::new(self.diagonal.len(), &self.joints);
+        let by_row = || self.joints.iter().map(|(i, j, value)| (*i, (*j, *value)));
+        let rows = Csr::sorted(self.diagonal.len(), by_row);
         let mut factor = Factor::shaped(&rows);
         factor.fill(&rows, &self.diagonal)?;
         Some(factor.solve(self.pull))
-    }
-}
-
-/// The strict lower triangle by rows; equal places add up.
-struct Rows {
-    starts: Vec<u32>,
-    entries: Vec<(u32, f64)>,
-}
-
-impl Rows {
-    fn new(n: usize, joints: &[(u32, u32, f64)]) -> Self {
-        let mut starts = vec![0_u32; n + 1];
-        joints.iter().for_each(|e| starts[e.0 as usize + 1] += 1);
-        (0..n).for_each(|i| starts[i + 1] += starts[i]);
-        let mut next = starts.clone();
-        let mut entries = vec![(0, 0.0); joints.len()];
-        for (i, j, value) in joints {
-            entries[next[*i as usize] as usize] = (*j, *value);
-            next[*i as usize] += 1;
-        }
-        Self { starts, entries }
-    }
-
-    fn len(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    fn row(&self, i: usize) -> &[(u32, f64)] {
-        &self.entries[self.starts[i] as usize..self.starts[i + 1] as usize]
     }
 }
 
@@ -73,17 +50,16 @@ impl Rows {
 struct Factor {
     /// The elimination tree.
     parents: Vec<u32>,
-    starts: Vec<u32>,
-    /// Row and value of each entry; the columns are filled row by row.
-    entries: Vec<(u32, f64)>,
+    /// Per column, row and value of each entry; the columns are filled row by row.
+    columns: Csr<(u32, f64)>,
     diagonal: Vec<f64>,
 }
 
 impl Factor {
     /// The tree, and room for every column.
-    fn shaped(rows: &Rows) -> Self {
+    fn shaped(rows: &LowerRows) -> Self {
         let n = rows.len();
-        let (mut parents, mut flags, mut starts) = (vec![NONE; n], vec![NONE; n], vec![0_u32; n + 1]);
+        let (mut parents, mut flags, mut lengths) = (vec![NONE; n], vec![NONE; n], vec![0_u32; n]);
         for k in 0..n {
             flags[k] = k as u32;
             for (i, _) in rows.row(k) {
@@ -91,7 +67,7 @@ impl Factor {
                 // Parents come after their children, and k is flagged: the climb ends there at the latest.
                 while flags[i] != k as u32 {
                     flags[i] = k as u32;
-                    starts[i + 1] += 1;
+                    lengths[i] += 1;
                     if parents[i] == NONE {
                         parents[i] = k as u32;
                     }
@@ -99,13 +75,11 @@ impl Factor {
                 }
             }
         }
-        (0..n).for_each(|i| starts[i + 1] += starts[i]);
-        let entries = vec![(0, 0.0); starts[n] as usize];
-        Self { parents, starts, entries, diagonal: Vec::with_capacity(n) }
+        Self { parents, columns: Csr::of_lengths(&lengths), diagonal: Vec::with_capacity(n) }
     }
 
     /// The unknowns before `k` on which row `k` of the factor depends, each after those that it depends on itself.
-    fn reach(&self, rows: &Rows, k: usize, flags: &mut [u32], reach: &mut Vec<u32>) {
+    fn reach(&self, rows: &LowerRows, k: usize, flags: &mut [u32], reach: &mut Vec<u32>) {
         reach.clear();
         flags[k] = k as u32;
         for (i, _) in rows.row(k).iter().rev() {
@@ -122,10 +96,11 @@ impl Factor {
     }
 
     /// Computes all rows; none where a pivot is not positive.
-    fn fill(&mut self, rows: &Rows, diagonal: &[f64]) -> Option<()> {
+    fn fill(&mut self, rows: &LowerRows, diagonal: &[f64]) -> Option<()> {
         let n = rows.len();
         let (mut flags, mut reach) = (vec![NONE; n], Vec::new());
-        let mut ends = self.starts[..n].to_vec();
+        // Per column, how many of its entries are known.
+        let mut known = vec![0; n];
         let mut work = vec![0.0; n];
         for k in 0..n {
             self.reach(rows, k, &mut flags, &mut reach);
@@ -133,12 +108,12 @@ impl Factor {
             let mut pivot = diagonal[k];
             for i in reach.iter().map(|i| *i as usize) {
                 let y = std::mem::take(&mut work[i]);
-                let (start, end) = (self.starts[i] as usize, ends[i] as usize);
-                self.entries[start..end].iter().for_each(|(j, l)| work[*j as usize] -= l * y);
+                let column = self.columns.row_mut(i);
+                column[..known[i]].iter().for_each(|(j, l)| work[*j as usize] -= l * y);
                 let l = y / self.diagonal[i];
                 pivot -= l * y;
-                self.entries[end] = (k as u32, l);
-                ends[i] += 1;
+                column[known[i]] = (k as u32, l);
+                known[i] += 1;
             }
             if pivot.is_nan() || pivot <= 0.0 {
                 return None;
@@ -149,14 +124,13 @@ impl Factor {
     }
 
     fn solve(&self, mut x: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-        let column = |i: usize| &self.entries[self.starts[i] as usize..self.starts[i + 1] as usize];
         for i in 0..x.len() {
             let y = x[i];
-            column(i).iter().for_each(|(j, l)| (0..2).for_each(|k| x[*j as usize][k] -= l * y[k]));
+            self.columns.row(i).iter().for_each(|(j, l)| (0..2).for_each(|k| x[*j as usize][k] -= l * y[k]));
         }
         for i in (0..x.len()).rev() {
             let mut y = x[i].map(|y| y / self.diagonal[i]);
-            column(i).iter().for_each(|(j, l)| (0..2).for_each(|k| y[k] -= l * x[*j as usize][k]));
+            self.columns.row(i).iter().for_each(|(j, l)| (0..2).for_each(|k| y[k] -= l * x[*j as usize][k]));
             x[i] = y;
         }
         x

@@ -4,8 +4,8 @@
 
 use super::dual::Dual;
 use super::merge::Limits;
-use crate::topology::HalfEdgeId;
 use crate::topology::union_find::UnionFind;
+use crate::topology::{HalfEdgeId, VisitStamps};
 
 /// A chart keeps at least this share of its area in a step of straightening.
 pub(super) const LEAST: f64 = 0.5;
@@ -34,16 +34,11 @@ pub(super) struct Network<'a> {
     open: Vec<u32>,
     /// Per vertex, one half-edge that begins there.
     pub out: Vec<HalfEdgeId>,
-    pub marks: Marks,
-}
-
-/// Marks that are cleared by counting on.
-#[derive(Clone)]
-pub(super) struct Marks {
-    pub now: u32,
-    pub faces: Vec<u32>,
-    pub vertices: Vec<u32>,
-    pub half_edges: Vec<u32>,
+    /// The triangles that were given a label by the seams that are being laid.
+    pub claimed: VisitStamps,
+    /// The half-edges and the vertices that the walk along a boundary has visited.
+    pub seen_half_edges: VisitStamps,
+    pub seen_vertices: VisitStamps,
 }
 
 impl<'a> Network<'a> {
@@ -63,7 +58,9 @@ impl<'a> Network<'a> {
             degree: vec![0; vertices],
             open: open_loops(dual),
             out: vec![HalfEdgeId(0); vertices],
-            marks: Marks { now: 0, faces: vec![0; faces], vertices: vec![0; vertices], half_edges: vec![0; 3 * faces] },
+            claimed: VisitStamps::new(faces),
+            seen_half_edges: VisitStamps::new(3 * faces),
+            seen_vertices: VisitStamps::new(vertices),
             labels,
         };
         for (f, label) in made.labels.iter().enumerate() {

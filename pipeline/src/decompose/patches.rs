@@ -7,6 +7,7 @@
 
 use super::voronoi::{Cells, Graph, nearest, seeds};
 use crate::monitor::{Checkpoint, Interrupted};
+use crate::topology::csr::Csr;
 
 /// Patches to a cell.
 const SAMPLES: usize = 16;
@@ -23,25 +24,23 @@ pub(super) fn compact_cells<G: Graph>(
     let patches = Patches::new(graph, |size| size / (SAMPLES * wanted(size)).max(1));
     checkpoint.after(graph.len())?;
     let seeds = seeds(&patches, |part| wanted(part.iter().map(|p| patches.size(*p)).sum()));
-    let nodes: Vec<usize> = seeds.iter().map(|p| patches.nodes[patches.starts[*p]] as usize).collect();
+    let nodes: Vec<usize> = seeds.iter().map(|p| patches.nodes.row(*p)[0] as usize).collect();
     checkpoint.after(graph.len())?;
     Ok(nearest(graph, &nodes))
 }
 
 /// Connected patches of nodes, and the graph of them.
 struct Patches {
-    /// Nodes patch by patch, each from its middle outwards; where each patch starts, and one more.
-    nodes: Vec<u32>,
-    starts: Vec<usize>,
+    /// The nodes of each patch, from its middle outwards.
+    nodes: Csr<u32>,
     /// The patches beside each one, with the lengths of paths between their first nodes.
-    beside: Vec<(u32, f64)>,
-    beside_starts: Vec<usize>,
+    beside: Csr<(u32, f64)>,
 }
 
 impl Patches {
     /// Patches of about `size(nodes)` nodes in a component of so many nodes, at least 1.
     fn new<G: Graph>(graph: &G, size: impl Fn(usize) -> usize) -> Self {
-        let mut made = Self { nodes: Vec::new(), starts: vec![0], beside: Vec::new(), beside_starts: vec![0] };
+        let mut made = Self { nodes: Csr::with_capacity(graph.len()), beside: Csr::default() };
         let mut seen = vec![false; graph.len()];
         let mut patch_of = vec![NONE; graph.len()];
         let mut distance = vec![0.0; graph.len()];
@@ -63,58 +62,55 @@ impl Patches {
         if patch_of[first as usize] != NONE {
             return;
         }
-        let (start, patch) = (self.nodes.len(), self.starts.len() as u32 - 1);
+        let patch = self.nodes.len() as u32;
         patch_of[first as usize] = patch;
         self.nodes.push(first);
-        let mut next = start;
-        while next < self.nodes.len() {
-            let node = self.nodes[next] as usize;
+        let mut next = 0;
+        while let Some(node) = self.nodes.open_row().get(next).map(|n| *n as usize) {
             let nodes = &mut self.nodes;
             graph.each_neighbour(node, |other, step| {
-                if patch_of[other] == NONE && nodes.len() < start + size {
+                if patch_of[other] == NONE && nodes.open_row().len() < size {
                     (patch_of[other], distance[other]) = (patch, distance[node] + step);
                     nodes.push(other as u32);
                 }
             });
             next += 1;
         }
-        self.starts.push(self.nodes.len());
+        self.nodes.close_row();
     }
 
     fn link<G: Graph>(&mut self, graph: &G, patch_of: &[u32], distance: &[f64]) {
         for patch in 0..self.len() {
-            let first = self.beside.len();
-            let beside = &mut self.beside;
-            for node in self.nodes[self.starts[patch]..self.starts[patch + 1]].iter().map(|n| *n as usize) {
+            // A patch has few neighbours.
+            let mut beside: Vec<(u32, f64)> = Vec::new();
+            for node in self.nodes.row(patch).iter().map(|n| *n as usize) {
                 graph.each_neighbour(node, |other, step| {
                     let (to, length) = (patch_of[other], distance[node] + step + distance[other]);
                     if to == patch as u32 {
                         return;
                     }
-                    // A patch has few neighbours.
-                    match beside[first..].iter_mut().find(|b| b.0 == to) {
+                    match beside.iter_mut().find(|b| b.0 == to) {
                         Some(known) => known.1 = known.1.min(length),
                         None => beside.push((to, length)),
                     }
                 });
             }
-            self.beside_starts.push(self.beside.len());
+            self.beside.push_row(beside);
         }
     }
 
     fn size(&self, patch: usize) -> usize {
-        self.starts[patch + 1] - self.starts[patch]
+        self.nodes.row(patch).len()
     }
 }
 
 impl Graph for Patches {
     fn len(&self) -> usize {
-        self.starts.len() - 1
+        self.nodes.len()
     }
 
     fn each_neighbour(&self, node: usize, mut visit: impl FnMut(usize, f64)) {
-        let range = self.beside_starts[node]..self.beside_starts[node + 1];
-        self.beside[range].iter().for_each(|(to, length)| visit(*to as usize, *length));
+        self.beside.row(node).iter().for_each(|(to, length)| visit(*to as usize, *length));
     }
 }
 

@@ -8,7 +8,9 @@
 use super::complex::{Complex, NONE};
 use super::ldl::Springs;
 use super::voronoi::Graph;
+use crate::fem::dofs::Dofs;
 use crate::measure::distortion::quantiles;
+use crate::topology::csr::Csr;
 use crate::vec3::{Vec3, distance};
 use std::f64::consts::TAU;
 
@@ -17,14 +19,14 @@ use std::f64::consts::TAU;
 pub(super) struct CellGraph {
     centroids: Vec<Vec3>,
     areas: Vec<f64>,
-    starts: Vec<u32>,
-    links: Vec<Link>,
+    /// Per cell the cells beside it, ascending.
+    links: Csr<Link>,
     /// Per cell its place in an order that is good to eliminate cells in.
     rank: Vec<u32>,
 }
 
 /// A cell beside another one.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Link {
     to: u32,
     conductance: f64,
@@ -38,21 +40,20 @@ impl CellGraph {
         let centroids: Vec<Vec3> = complex.cells.iter().map(|c| c.centroid).collect();
         let areas = complex.cells.iter().map(|c| c.area).collect();
         let count = complex.cells.len();
-        let mut graph = Self { centroids, areas, starts: vec![0; count + 1], links: Vec::new(), rank: Vec::new() };
+        let mut graph = Self { centroids, areas, links: Csr::default(), rank: Vec::new() };
         let inner = complex.arcs.iter().filter(|a| a.twin != NONE);
         let mut pairs: Vec<(u32, u32, f64, f64)> =
             inner.map(|a| (a.cell, complex.arcs[a.twin as usize].cell, a.length, a.feature)).collect();
         pairs.sort_unstable_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)).then(x.2.total_cmp(&y.2)));
-        for run in pairs.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
+        let link = |run: &[(u32, u32, f64, f64)]| {
             let (a, b, ..) = run[0];
             let length: f64 = run.iter().map(|pair| pair.2).sum();
             let sharp: f64 = run.iter().map(|pair| pair.3).sum();
             let distance = graph.spacing(a, b);
-            let feature = 2.0 * sharp > length;
-            graph.links.push(Link { to: b, conductance: length / distance, distance, feature });
-            graph.starts[a as usize + 1] += 1;
-        }
-        (0..count).for_each(|c| graph.starts[c + 1] += graph.starts[c]);
+            (a, Link { to: b, conductance: length / distance, distance, feature: 2.0 * sharp > length })
+        };
+        let links: Vec<(u32, Link)> = pairs.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).map(link).collect();
+        graph.links = Csr::sorted(count, || links.iter().copied());
         graph.rank = graph.dissected();
         graph
     }
@@ -106,7 +107,7 @@ impl CellGraph {
     }
 
     fn links(&self, cell: u32) -> &[Link] {
-        &self.links[self.starts[cell as usize] as usize..self.starts[cell as usize + 1] as usize]
+        self.links.row(cell as usize)
     }
 
     pub(super) fn area(&self, cell: u32) -> f64 {
@@ -163,10 +164,8 @@ fn runs(complex: &Complex, turn: &[u32]) -> Vec<Run> {
 /// The system of one union.
 struct System<'a> {
     graph: &'a CellGraph,
-    /// The cells in the order of their unknowns.
-    cells: &'a [u32],
-    /// Per cell of the graph its unknown, or [`NONE`].
-    number: &'a [u32],
+    /// The unknowns of the union's cells, out of those of the graph.
+    dofs: &'a Dofs,
     /// The places of cells, then those of the nodes that close inner loops.
     unknowns: usize,
     links: Vec<([u32; 2], f64)>,
@@ -186,18 +185,17 @@ pub(super) fn area_ratio(complex: &Complex, graph: &CellGraph, cells: &[u32], lo
     let longest = lengths.iter().fold(0.0, |m, l| f64::max(m, *l));
     let mut cells = cells.to_vec();
     cells.sort_unstable_by_key(|c| graph.rank[*c as usize]);
-    let mut number = vec![NONE; graph.areas.len()];
-    cells.iter().zip(0..).for_each(|(c, i)| number[*c as usize] = i);
+    let dofs = Dofs::new(graph.areas.len(), cells);
     let runs: Vec<Vec<Run>> = loops.iter().map(|l| runs(complex, l)).collect();
     let with_outer = |outer: usize| {
-        let mut system = System::new(graph, &cells, &number);
+        let mut system = System::new(graph, &dofs);
         for (i, runs) in runs.iter().enumerate() {
             if i == outer { system.prescribe(runs) } else { system.close(runs, lengths[i] / TAU) }
         }
         system.solve().map_or(f64::INFINITY, |places| system.ratio(&places))
     };
     let mut long = (0..loops.len()).filter(|i| lengths[*i] >= LONG * longest);
-    if cells.len() == 1 {
+    if dofs.count() == 1 {
         return (1.0, long.next().unwrap_or(0));
     }
     let all = long.map(|outer| (with_outer(outer), outer));
@@ -205,17 +203,22 @@ pub(super) fn area_ratio(complex: &Complex, graph: &CellGraph, cells: &[u32], lo
 }
 
 impl<'a> System<'a> {
-    fn new(graph: &'a CellGraph, cells: &'a [u32], number: &'a [u32]) -> Self {
+    fn new(graph: &'a CellGraph, dofs: &'a Dofs) -> Self {
         let mut links = Vec::new();
-        for (c, i) in cells.iter().zip(0..) {
+        for (i, c) in dofs.free().iter().enumerate() {
             for link in graph.links(*c) {
-                let j = number[link.to as usize];
-                if j != NONE && i < j {
-                    links.push(([i, j], link.conductance));
+                match dofs.unknown(link.to as usize) {
+                    Some(j) if i < j => links.push(([i as u32, j as u32], link.conductance)),
+                    _ => {}
                 }
             }
         }
-        Self { graph, cells, number, unknowns: cells.len(), links, rim: Vec::new() }
+        Self { graph, dofs, unknowns: dofs.count(), links, rim: Vec::new() }
+    }
+
+    /// The unknown of a cell of the union.
+    fn unknown(&self, cell: u32) -> u32 {
+        self.dofs.element(&[cell as usize])[0]
     }
 
     /// From the middle of a run to the centroid of its cell.
@@ -228,7 +231,7 @@ impl<'a> System<'a> {
     fn prescribe(&mut self, runs: &[Run]) {
         for run in runs {
             let (sin, cos) = (TAU * run.at).sin_cos();
-            self.rim.push((self.number[run.cell as usize], run.length / self.reach(run), [cos, sin]));
+            self.rim.push((self.unknown(run.cell), run.length / self.reach(run), [cos, sin]));
         }
     }
 
@@ -238,7 +241,7 @@ impl<'a> System<'a> {
         self.unknowns += 1;
         for run in runs {
             let conductance = run.length / (self.reach(run) + radius);
-            self.links.push(([self.number[run.cell as usize], centre], conductance));
+            self.links.push(([self.unknown(run.cell), centre], conductance));
         }
     }
 
@@ -262,14 +265,14 @@ impl<'a> System<'a> {
         for (i, w, p) in &self.rim {
             energy[*i as usize] += w * squared(place(*i), *p);
         }
-        let mut densities: Vec<(f64, f64)> = (0..self.cells.len()).map(|i| self.density(i, &energy)).collect();
+        let mut densities: Vec<(f64, f64)> = (0..self.dofs.count()).map(|i| self.density(i, &energy)).collect();
         let [low, high] = quantiles(&mut densities, [QUANTILE, 1.0 - QUANTILE]);
         if low > 0.0 { (high / low).max(1.0) } else { f64::INFINITY }
     }
 
     /// The energy density of a star of cells, and the area of its middle one.
     fn density(&self, i: usize, energy: &[f64]) -> (f64, f64) {
-        let area = self.graph.area(self.cells[i]);
+        let area = self.graph.area(self.dofs.free()[i]);
         (energy[i] / area, area)
     }
 }

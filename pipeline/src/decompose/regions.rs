@@ -5,6 +5,7 @@
 //! judged at the cost of its boundary, not of its area, and whatever the number of triangles.
 
 use super::complex::{Complex, NONE};
+use crate::topology::VisitStamps;
 use crate::vec3::Vec3;
 
 /// What is known of a region.
@@ -61,21 +62,21 @@ pub(super) struct Regions<'a> {
     /// Per cell its region.
     pub of_cell: Vec<u32>,
     pub all: Vec<Region>,
-    stamps: Stamps,
-}
-
-/// Marks that are cleared by counting on.
-struct Stamps {
-    now: u32,
-    arcs: Vec<u32>,
-    corners: Vec<u32>,
+    /// The half-arcs and the corners that the walk at hand has visited.
+    seen_arcs: VisitStamps,
+    seen_corners: VisitStamps,
 }
 
 impl<'a> Regions<'a> {
     /// One region per group of cells: `of_cell` tells the group of each cell, of `count` groups.
     pub(super) fn new(complex: &'a Complex, of_cell: Vec<u32>, count: usize) -> Self {
-        let stamps = Stamps { now: 0, arcs: vec![0; complex.arcs.len()], corners: vec![0; complex.corners] };
-        let mut made = Self { complex, of_cell, all: vec![Region::default(); count], stamps };
+        let mut made = Self {
+            complex,
+            of_cell,
+            all: vec![Region::default(); count],
+            seen_arcs: VisitStamps::new(complex.arcs.len()),
+            seen_corners: VisitStamps::new(complex.corners),
+        };
         for (c, cell) in complex.cells.iter().enumerate() {
             let region = &mut made.all[made.of_cell[c] as usize];
             region.cells.push(c as u32);
@@ -131,18 +132,17 @@ impl<'a> Regions<'a> {
 
     /// Walks along the boundary of the union of `a` and `b`, whose boundary half-arcs are given.
     fn outline(&mut self, a: u32, b: u32, boundary: &[u32]) -> Outline {
-        self.stamps.now += 1;
-        let now = self.stamps.now;
+        self.seen_arcs.clear();
+        self.seen_corners.clear();
         let mut outline = Outline::default();
         for start in boundary {
             let mut turn = Vec::new();
             let mut arc = *start;
             // The next boundary half-arc is unique, and so is the one before: the walk closes where it began.
-            while std::mem::replace(&mut self.stamps.arcs[arc as usize], now) != now {
+            while self.seen_arcs.visit(arc as usize) {
                 turn.push(arc);
                 let half = &self.complex.arcs[arc as usize];
-                let again = std::mem::replace(&mut self.stamps.corners[half.from as usize], now) == now;
-                outline.pinches += usize::from(again);
+                outline.pinches += usize::from(!self.seen_corners.visit(half.from as usize));
                 outline.meets_itself |= half.foes.iter().any(|f| [a, b].contains(&self.of_cell[*f as usize]));
                 arc = self.next(a, b, arc);
             }

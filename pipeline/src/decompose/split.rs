@@ -12,7 +12,6 @@ use super::regions::Regions;
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
-use crate::mesh::SurfaceMesh;
 use crate::monitor::Monitor;
 use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
@@ -23,13 +22,12 @@ const LEVELS: [f64; 9] = [0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7];
 /// How much longer a cut in the middle may be than one away from it, per share of the range.
 const OFF_CENTRE: f64 = 3.0;
 
-/// Cuts `chart`, a part of `mesh`, into at least two charts with the same id; none where it is a single triangle.
+/// Cuts `chart` into at least two charts with the same id; none where it is a single triangle.
 /// `log_scale` is the logarithm of the area scale of each triangle, where the chart has a map.
 ///
 /// # Errors
 /// [`Error::Illegal`]: a fault of planish; [`Error::Interrupted`].
 pub fn split(
-    mesh: &SurfaceMesh,
     chart: &Chart,
     log_scale: Option<&[f64]>,
     settings: &Settings,
@@ -42,10 +40,10 @@ pub fn split(
         let by_scale = log_scale.and_then(|s| across_protrusion(dual, s, limits));
         by_scale.unwrap_or_else(|| halves(dual, limits))
     };
-    pieces(mesh, chart, cut, settings, monitor).map(Some)
+    pieces(chart, cut, settings, monitor).map(Some)
 }
 
-/// Cuts `chart`, a part of `mesh`, between two of its vertices, given by their places in the chart, into at least two
+/// Cuts `chart` between two of its vertices, given by their places in the chart, into at least two
 /// charts with the same id. No triangle may have both as corners.
 ///
 /// A chart whose boundary passes twice through one place in space (copies of a vertex at which sheets touch) cannot be
@@ -54,31 +52,24 @@ pub fn split(
 /// # Errors
 /// As [`split`].
 pub fn separate(
-    mesh: &SurfaceMesh,
     chart: &Chart,
     ends: [VertexId; 2],
     settings: &Settings,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Chart>, Error> {
     let cut = |dual: &Dual, limits: &Limits| bisected(dual, Cells { of: nearer_end(dual, ends), count: 2 }, limits);
-    pieces(mesh, chart, cut, settings, monitor)
+    pieces(chart, cut, settings, monitor)
 }
 
-/// Cuts `chart`, a part of `mesh`, into at least two charts with the same id, between the triangles on one side and
+/// Cuts `chart` into at least two charts with the same id, between the triangles on one side and
 /// those on the other; `is_left` tells the side of each. Of each side the largest connected part keeps it.
 ///
 /// # Errors
 /// As [`split`].
-pub fn halve(
-    mesh: &SurfaceMesh,
-    chart: &Chart,
-    is_left: &[bool],
-    settings: &Settings,
-    monitor: &dyn Monitor,
-) -> Result<Vec<Chart>, Error> {
+pub fn halve(chart: &Chart, is_left: &[bool], settings: &Settings, monitor: &dyn Monitor) -> Result<Vec<Chart>, Error> {
     let cut =
         |dual: &Dual, limits: &Limits| bisected(dual, Cells { of: largest_parts(dual, is_left), count: 2 }, limits);
-    pieces(mesh, chart, cut, settings, monitor)
+    pieces(chart, cut, settings, monitor)
 }
 
 /// Per triangle 0 or 1, the side of the largest connected part of one side that is the fewest triangles away.
@@ -100,9 +91,9 @@ fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
 }
 
 /// Two vertices of a chart that are copies of one vertex of the input, if there are any.
-pub fn contact(mesh: &SurfaceMesh, chart: &Chart) -> Option<[VertexId; 2]> {
-    let welded = |(v, place): (&VertexId, u32)| (mesh.welded_vertex(*v), place);
-    let mut copies: Vec<(u32, u32)> = chart.vertices().iter().zip(0..).map(welded).collect();
+pub fn contact(chart: &Chart) -> Option<[VertexId; 2]> {
+    let welded = |v: u32| (chart.welded_vertex(VertexId(v)), v);
+    let mut copies: Vec<(u32, u32)> = (0..chart.vertices().len() as u32).map(welded).collect();
     copies.sort_unstable();
     let twice = copies.windows(2).find(|w| w[0].0 == w[1].0)?;
     Some([VertexId(twice[0].1), VertexId(twice[1].1)])
@@ -110,13 +101,12 @@ pub fn contact(mesh: &SurfaceMesh, chart: &Chart) -> Option<[VertexId; 2]> {
 
 /// The charts into which `cut` labels the triangles of `chart`, with straightened seams.
 fn pieces(
-    mesh: &SurfaceMesh,
     chart: &Chart,
     cut: impl FnOnce(&Dual, &Limits) -> Vec<u32>,
     settings: &Settings,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Chart>, Error> {
-    let part = mesh.part(chart);
+    let part = chart.to_surface();
     let (dual, _) = with_features(&part, settings, monitor)?;
     let limits = Limits::new(settings);
     let labels = cut(&dual, &limits);

@@ -1,8 +1,9 @@
 use super::*;
 use crate::mesh::TriangleSoup;
 use crate::monitor::NoMonitor;
+use crate::parametrize::parametrize_chart;
 use crate::topology::VertexId;
-use crate::{Order, finish_chart, finish_or_split, map_or_split, repair, shapes};
+use crate::{ChartJob, ChartSettings, Order, repair, shapes};
 
 fn surface(soup: &TriangleSoup) -> SurfaceMesh {
     repair(soup, &Default::default()).expect("a surface is left").mesh
@@ -126,14 +127,13 @@ fn what_stretches_too_much_is_split_until_it_does_not() {
         let settings = Settings { max_area_ratio, ..smooth() };
         let whole = assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk");
         let chart = whole.into_charts().remove(0);
-        let parts = map_or_split(&mesh, chart, Order::Quadratic, &settings, &NoMonitor).expect("maps");
+        let settings = ChartSettings { order: Order::Quadratic, decompose: settings };
+        let parts = ChartJob { chart, settings }.map(&NoMonitor).expect("maps");
         assert!(parts.len() > 2, "{}", parts.len());
-        assert_eq!(parts.iter().map(|(c, _)| c.triangles().len()).sum::<usize>(), mesh.triangles().len());
-        let finish = |(chart, mapped)| {
-            finish_or_split(&mesh, chart, mapped, Order::Quadratic, &settings, &NoMonitor).expect("maps")
-        };
-        for (chart, done) in parts.into_iter().flat_map(finish) {
-            let ratio = crate::measure::distortion::area_ratio(&chart, &done.certified);
+        let triangles = parts.iter().map(|p| p.chart().triangles().len());
+        assert_eq!(triangles.sum::<usize>(), mesh.triangles().len());
+        for done in parts.into_iter().flat_map(|part| part.untangle(&NoMonitor).expect("maps")) {
+            let ratio = done.distortion().area_ratio;
             assert!(ratio <= max_area_ratio, "{ratio} > {max_area_ratio}");
         }
     }
@@ -150,8 +150,7 @@ fn prediction_agrees_with_the_map_within_a_decade() {
         let network = network::Network::new(&dual, vec![0; mesh.triangles().len()], limits);
         let predicted = judge::judge(&network, &cells)[0].expect("a chart").ratio;
         let chart = assemble(&mesh, &network.labels).expect("a disk").into_charts().remove(0);
-        let done = finish_chart(crate::map_chart(&chart, Order::Linear).expect("maps"));
-        let measured = crate::measure::distortion::area_ratio(&chart, &done.certified);
+        let measured = parametrize_chart(chart, Order::Linear).expect("maps").distortion().area_ratio;
         assert!((predicted / measured).log10().abs() < 1.0, "length {length}: {predicted:.1e}, {measured:.1e}");
     }
 }

@@ -25,16 +25,54 @@ pub enum Validity {
     Invalid,
 }
 
+/// A lower bound of a determinant, and what it took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LowerBound {
+    /// The bound, rounded down; on the reference triangle of area 1/2.
+    pub value: f64,
+    /// How often triangles were subdivided.
+    pub depth: u32,
+}
+
+/// The least and the largest value of a polynomial over a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The least value.
+    pub min: f64,
+    /// The largest value.
+    pub max: f64,
+}
+
 /// The Bernstein coefficients of a jacobian determinant, doubled, in grid units squared (2^-106): exact.
+///
+/// # Example
+///
+/// The middle of an edge may move along it, up to a quarter of the way to a vertex: there the triangle folds.
+///
+/// ```
+/// use planish_core::fem::bernstein::{JacobianBezier, Validity};
+/// use planish_core::grid::GridPoint;
+///
+/// let [a, b, c] = [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]].map(GridPoint::vertex);
+/// let with_middle = |x: f64| {
+///     JacobianBezier::new([a, b, c, GridPoint::mid([x, 0.0]), b.midpoint(c), c.midpoint(a)])
+/// };
+/// assert_eq!(with_middle(0.25).validity(), Validity::ByBounds);
+/// assert_eq!(with_middle(0.37).validity(), Validity::ByBounds);
+/// assert_eq!(with_middle(0.375).validity(), Validity::Invalid);
+/// // A straight triangle has twice its area everywhere.
+/// assert_eq!(with_middle(0.25).coefficients(), [0.25; 6]);
+/// assert!(with_middle(0.25).lower_bound().value <= 0.25);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ExactDet {
+pub struct JacobianBezier {
     /// At the corners: 2 M_00, 2 M_11, 2 M_22.
     pub corner: [i128; 3],
     /// At the edges: 2 M_01, 2 M_12, 2 M_20.
     pub edge: [i128; 3],
 }
 
-impl ExactDet {
+impl JacobianBezier {
     /// The coefficients of the triangle with these nodes (three vertices, then the middles of 01, 12, 20), whose
     /// vertices lie on the grid of vertices.
     pub fn new(nodes: [GridPoint; 6]) -> Self {
@@ -77,27 +115,28 @@ impl ExactDet {
         det > zero || !(0..3).all(|k| diagonal(k) > zero && mixed(k) > zero)
     }
 
-    /// A lower bound of the determinant over the triangle (on the reference triangle of area 1/2), rounded down,
-    /// and the depth of subdivision it took. Subdivides while a coefficient is not positive, to a fixed depth.
-    pub fn lower_bound(&self) -> (f64, u32) {
+    /// A lower bound of the determinant over the triangle. Subdivides while a coefficient is not positive, to a fixed
+    /// depth.
+    pub fn lower_bound(&self) -> LowerBound {
         let mut pieces = vec![*self];
-        let mut least: Option<f64> = None;
+        let mut value = f64::INFINITY;
         let mut depth = 0;
         loop {
             let scale = (4.0_f64).powi(-(depth as i32)) / (2.0 * UNITS * UNITS);
             let last = depth == DEPTH;
-            let (done, open): (Vec<_>, Vec<_>) = pieces.into_iter().partition(|p| last || p.least() > 0);
-            let bounds = done.iter().map(|p| (p.least() as f64).next_down() * scale);
-            least = bounds.chain(least).reduce(f64::min);
+            let (done, open): (Vec<_>, Vec<_>) = pieces.into_iter().partition(|p| last || p.min_coefficient() > 0);
+            for piece in &done {
+                value = value.min((piece.min_coefficient() as f64).next_down() * scale);
+            }
             if open.is_empty() {
-                return (least.unwrap_or(0.0), depth);
+                return LowerBound { value, depth };
             }
             pieces = open.iter().flat_map(Self::quarters).collect();
             depth += 1;
         }
     }
 
-    fn least(&self) -> i128 {
+    fn min_coefficient(&self) -> i128 {
         self.corner.iter().chain(&self.edge).fold(i128::MAX, |m, c| m.min(*c))
     }
 
@@ -131,26 +170,26 @@ fn twice(v: GridVector) -> GridVector {
 
 /// The least and the largest value over the triangle of the quadratic polynomial with these Bernstein
 /// coefficients (M_00, M_11, M_22, M_01, M_12, M_20), up to rounding.
-pub fn range(c: [f64; 6]) -> (f64, f64) {
-    (least(c), -least(c.map(|v| -v)))
+pub fn range(c: [f64; 6]) -> Range {
+    Range { min: minimum(c), max: -minimum(c.map(|v| -v)) }
 }
 
-fn least(c: [f64; 6]) -> f64 {
+fn minimum(c: [f64; 6]) -> f64 {
     let corners = c[0].min(c[1]).min(c[2]);
-    let edges = [(0, 3, 1), (1, 4, 2), (2, 5, 0)].map(|(a, m, b)| least_on_edge(c[a], c[m], c[b]));
-    let inside = least_inside(c).unwrap_or(f64::INFINITY);
+    let edges = [(0, 3, 1), (1, 4, 2), (2, 5, 0)].map(|(a, m, b)| min_on_edge(c[a], c[m], c[b]));
+    let inside = min_inside(c).unwrap_or(f64::INFINITY);
     edges.into_iter().fold(corners.min(inside), f64::min)
 }
 
 /// The least value of (1-t)^2 a + 2 t (1-t) m + t^2 b for t in [0, 1].
-fn least_on_edge(a: f64, m: f64, b: f64) -> f64 {
+fn min_on_edge(a: f64, m: f64, b: f64) -> f64 {
     let bend = (a - m) + (b - m);
     let t = (a - m) / bend;
     if bend > 0.0 && t > 0.0 && t < 1.0 { a + t * (m - a) } else { a.min(b) }
 }
 
 /// The value at the stationary point, if it lies inside and is a minimum: l ~ adj(M) e, value det M / sum.
-fn least_inside(c: [f64; 6]) -> Option<f64> {
+fn min_inside(c: [f64; 6]) -> Option<f64> {
     // With x, y the coordinates of corners 1 and 2: value = c0 + 2 g.x + x^T H x.
     let g = [c[3] - c[0], c[5] - c[0]];
     let h = [c[0] - 2.0 * c[3] + c[1], c[0] - c[3] - c[5] + c[4], c[0] - 2.0 * c[5] + c[2]];
@@ -168,7 +207,7 @@ mod tests {
 
     /// The exact sign of the minimum over the triangle, found another way: by the values at corners and at the
     /// stationary points of edges and of the inside, all in rationals.
-    fn positive_everywhere(det: &ExactDet) -> bool {
+    fn positive_everywhere(det: &JacobianBezier) -> bool {
         let big = |v: i128| BigInt::from(v);
         let d = det.corner.map(big);
         let e = det.edge.map(big);
@@ -191,10 +230,11 @@ mod tests {
         !inside || positive(&(&d[0] * &hd + &g[0] * &x + &g[1] * &y))
     }
 
-    fn coefficients(range: i128) -> impl Strategy<Value = ExactDet> {
+    fn coefficients(range: i128) -> impl Strategy<Value = JacobianBezier> {
         let one = move || -range..=range;
         let corner = move || 1..=range;
-        ([corner(), corner(), corner()], [one(), one(), one()]).prop_map(|(corner, edge)| ExactDet { corner, edge })
+        ([corner(), corner(), corner()], [one(), one(), one()])
+            .prop_map(|(corner, edge)| JacobianBezier { corner, edge })
     }
 
     proptest! {
@@ -212,11 +252,11 @@ mod tests {
     proptest! {
         #[test]
         fn bounds_enclose_the_range(det in coefficients(1 << 110)) {
-            let (low, depth) = det.lower_bound();
-            let (least, largest) = range(det.coefficients());
+            let LowerBound { value: low, depth } = det.lower_bound();
+            let Range { min: least, max: largest } = range(det.coefficients());
             let size = det.coefficients().iter().fold(0.0_f64, |m, c| m.max(c.abs()));
             prop_assert!(low <= least + 1e-12 * size && depth <= DEPTH);
-            let plain = det.least() as f64 / (2.0 * UNITS * UNITS);
+            let plain = det.min_coefficient() as f64 / (2.0 * UNITS * UNITS);
             prop_assert!(low >= plain - 1e-15 * plain.abs());
             for i in 0..=10 {
                 for j in 0..=10 - i {
@@ -238,11 +278,11 @@ mod tests {
 
     #[test]
     fn a_straight_triangle_has_twice_its_area_everywhere() {
-        let det = ExactDet::new(straight([[0.0, 0.0], [0.5, 0.0], [0.0, 0.25]]));
+        let det = JacobianBezier::new(straight([[0.0, 0.0], [0.5, 0.0], [0.0, 0.25]]));
         assert_eq!(det.coefficients(), [0.125; 6]);
-        assert_eq!(range(det.coefficients()), (0.125, 0.125));
+        assert_eq!(range(det.coefficients()), Range { min: 0.125, max: 0.125 });
         assert_eq!(det.validity(), Validity::ByBounds);
-        let flat = ExactDet::new(straight([[0.0, 0.0], [0.5, 0.5], [0.25, 0.25]]));
+        let flat = JacobianBezier::new(straight([[0.0, 0.0], [0.5, 0.5], [0.25, 0.25]]));
         assert_eq!(flat.validity(), Validity::Invalid);
     }
 
@@ -250,37 +290,37 @@ mod tests {
     fn one_unit_of_the_grid_decides() {
         let unit = 1.0 / UNITS;
         let valid = straight([[0.0, 0.0], [1.0, 0.0], [0.5, 2.0 * unit]]);
-        assert_eq!(ExactDet::new(valid).validity(), Validity::ByBounds);
+        assert_eq!(JacobianBezier::new(valid).validity(), Validity::ByBounds);
         let upside_down = straight([[0.0, 0.0], [1.0, 0.0], [0.5, -2.0 * unit]]);
-        assert_eq!(ExactDet::new(upside_down).validity(), Validity::Invalid);
+        assert_eq!(JacobianBezier::new(upside_down).validity(), Validity::Invalid);
         // The middle of edge 01 a quarter towards corner 1 makes the jacobian vanish at corner 1, exactly.
         let mut nodes = straight([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]]);
         nodes[3] = GridPoint::mid([0.375, 0.0]);
-        assert_eq!(ExactDet::new(nodes).corner[1], 0);
-        assert_eq!(ExactDet::new(nodes).validity(), Validity::Invalid);
+        assert_eq!(JacobianBezier::new(nodes).corner[1], 0);
+        assert_eq!(JacobianBezier::new(nodes).validity(), Validity::Invalid);
         nodes[3] = GridPoint { x: nodes[3].x - 1, ..nodes[3] };
-        assert_ne!(ExactDet::new(nodes).validity(), Validity::Invalid);
+        assert_ne!(JacobianBezier::new(nodes).validity(), Validity::Invalid);
     }
 
     #[test]
     fn a_double_root_is_invalid_and_a_hair_above_it_valid() {
         // (l0 - l1)^2 + l2^2 + ... : zero in the middle of edge 01.
-        let touching = ExactDet { corner: [4, 4, 4], edge: [-4, 4, 4] };
+        let touching = JacobianBezier { corner: [4, 4, 4], edge: [-4, 4, 4] };
         assert_eq!(touching.validity(), Validity::Invalid);
-        let above = ExactDet { corner: [4, 5, 4], edge: [-4, 4, 4] };
+        let above = JacobianBezier { corner: [4, 5, 4], edge: [-4, 4, 4] };
         assert_eq!(above.validity(), Validity::ByCopositivity);
         // (l0 + l1 - 2 l2)^2: zero on a line through the inside.
-        let inside = ExactDet { corner: [1, 1, 4], edge: [1, -2, -2] };
+        let inside = JacobianBezier { corner: [1, 1, 4], edge: [1, -2, -2] };
         assert_eq!(inside.validity(), Validity::Invalid);
-        let lifted = ExactDet { corner: [11, 11, 41], edge: [11, -19, -19] };
+        let lifted = JacobianBezier { corner: [11, 11, 41], edge: [11, -19, -19] };
         assert_eq!(lifted.validity(), Validity::ByCopositivity);
     }
 
     #[test]
     fn quarters_carry_the_same_polynomial() {
-        let det = ExactDet { corner: [7, -3, 11], edge: [2, 5, -9] };
+        let det = JacobianBezier { corner: [7, -3, 11], edge: [2, 5, -9] };
         let quarters = det.quarters();
-        let value = |d: &ExactDet, l: [i128; 3]| {
+        let value = |d: &JacobianBezier, l: [i128; 3]| {
             let c = d.corner;
             let e = d.edge;
             c[0] * l[0] * l[0]

@@ -7,27 +7,26 @@
 //! unknowns, and leaves a smaller factor than minimum degree on all of them (by a quarter on surfaces of 100 000
 //! triangles), which cannot see what vertices and edges have to do with each other.
 
-use crate::fem::sparse::{PRESCRIBED, Pattern};
-use crate::map::closed::ClosedChart;
+use crate::fem::dofs::Dofs;
+use crate::map::filled::FilledChart;
 use crate::topology::{HalfEdgeId, VertexId};
 
 /// The order in which the vertices inside are eliminated: all of the `count` ones in `triangles` that are not on
 /// `outer`.
 pub(crate) fn of_vertices(triangles: &[[VertexId; 3]], count: usize, outer: &[HalfEdgeId]) -> Vec<VertexId> {
-    let mut number = vec![0; count];
+    let mut is_outer = vec![false; count];
     for h in outer {
-        number[triangles[h.face().index()][h.side()].index()] = PRESCRIBED;
+        is_outer[triangles[h.face().index()][h.side()].index()] = true;
     }
-    let inside: Vec<VertexId> = (0..count).filter(|v| number[*v] != PRESCRIBED).map(VertexId::at).collect();
-    inside.iter().zip(0..).for_each(|(v, n)| number[v.index()] = n);
-    let elements: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| number[v.index()])).collect();
-    let order = Pattern::new(inside.len(), &elements).minimum_degree();
-    order.into_iter().map(|n| inside[n as usize]).collect()
+    let inside: Vec<u32> = (0..count as u32).filter(|v| !is_outer[*v as usize]).collect();
+    let dofs = Dofs::new(count, inside);
+    let order = dofs.pattern(triangles.iter().map(|t| t.map(|v| v.index()))).minimum_degree();
+    order.into_iter().map(|unknown| VertexId(dofs.free()[unknown as usize])).collect()
 }
 
 /// All nodes of quadratic elements in the order in which they are eliminated; those of which no vertex inside is an
 /// end come last.
-pub(crate) fn of_nodes(chart: &ClosedChart) -> Vec<usize> {
+pub(crate) fn of_nodes(chart: &FilledChart) -> Vec<usize> {
     let last = chart.elimination().len() as u64;
     let mut turn = vec![last; chart.vertex_count()];
     chart.elimination().iter().zip(0..).for_each(|(v, n)| turn[v.index()] = n);
@@ -41,36 +40,35 @@ pub(crate) fn of_nodes(chart: &ClosedChart) -> Vec<usize> {
     keyed.into_iter().map(|(_, node)| node).collect()
 }
 
+/// The unknowns of quadratic elements in the order in which they are eliminated: all nodes but those of the outer loop.
+pub(crate) fn dofs_inside(chart: &FilledChart) -> Dofs {
+    let is_outer = chart.outer_nodes();
+    let inside = of_nodes(chart).into_iter().filter(|n| !is_outer[*n]);
+    Dofs::new(chart.node_count(), inside.map(|n| n as u32).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mesh::TriangleSoup;
     use crate::{decompose, repair, shapes};
 
-    fn closed(soup: &TriangleSoup) -> ClosedChart {
+    fn filled(soup: &TriangleSoup) -> FilledChart {
         let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
+        FilledChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
     }
 
     /// How many numbers the factor of quadratic elements holds, nodes on the outer loop prescribed: in our order, and in
     /// that of minimum degree on all nodes.
-    fn factor_entries(chart: &ClosedChart) -> [usize; 2] {
-        let mut number = vec![0; chart.node_count()];
-        for h in chart.outer() {
-            number[chart.vertex_node(chart.ends(*h)[0])] = PRESCRIBED;
-            number[chart.mid_node(*h)] = PRESCRIBED;
-        }
-        let free: Vec<usize> = of_nodes(chart).into_iter().filter(|n| number[*n] != PRESCRIBED).collect();
-        free.iter().zip(0..).for_each(|(node, n)| number[*node] = n);
-        let elements: Vec<[u32; 6]> = (0..chart.triangles().len()).map(|f| chart.nodes(f).map(|n| number[n])).collect();
-        let pattern = Pattern::new(free.len(), &elements);
+    fn factor_entries(chart: &FilledChart) -> [usize; 2] {
+        let pattern = dofs_inside(chart).pattern((0..chart.triangles().len()).map(|f| chart.nodes(f)));
         [pattern.analyse_as_numbered(), pattern.analyse()].map(|a| a.expect("small").factor_entries())
     }
 
     #[test]
     fn every_vertex_inside_and_every_node_is_eliminated_once() {
         for soup in [shapes::disk(3), shapes::disk_with_holes(13, 2), shapes::sliver_strip(5)] {
-            let chart = closed(&soup);
+            let chart = filled(&soup);
             let mut vertices: Vec<VertexId> = chart.elimination().to_vec();
             vertices.extend(chart.outer().iter().map(|h| chart.ends(*h)[0]));
             vertices.sort_unstable();
@@ -84,7 +82,7 @@ mod tests {
     #[test]
     fn factors_are_no_larger_than_by_minimum_degree_on_all_nodes() {
         for soup in [shapes::disk(60), shapes::bent_disk(60, 0.45, 1.0), shapes::disk_with_holes(60, 3)] {
-            let [ours, plain] = factor_entries(&closed(&soup));
+            let [ours, plain] = factor_entries(&filled(&soup));
             assert!(ours <= plain, "{ours} against {plain}");
         }
     }

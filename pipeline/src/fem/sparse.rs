@@ -6,7 +6,7 @@
 //! doi 10.1137/S0895479894278952), or as they are numbered. General systems are solved by LU.
 
 use crate::monitor::{Interrupted, Monitor, Reserved};
-use crate::topology::csr::Buckets;
+use crate::topology::csr::Csr;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::prelude::Solve;
@@ -21,18 +21,18 @@ use faer::{Conj, MatMut, Par, Side};
 pub const PRESCRIBED: u32 = u32::MAX;
 
 /// Factors larger than this (bytes) are not made. A fixed number, so that results do not depend on the machine.
-const LARGEST_FACTOR: usize = 8 << 30;
+const MAX_FACTOR_BYTES: usize = 8 << 30;
 
 /// Factors with no more entries are made in about a millisecond: they are no safe points, as they come by the thousand.
-const SMALL: usize = 50_000;
+const MAX_SMALL_ENTRIES: usize = 50_000;
 
 /// So many times the bytes of a general matrix (12 per entry) are reserved to solve it, as the size of its factors is
 /// not known before. Surfaces of 20 000 to 400 000 triangles took 15 to 42 times as much, the more the larger.
 const GROWTH: usize = 40;
 
-/// Why a system was not solved.
+/// Why a system cannot be solved.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Error {
+pub enum Unsolvable {
     /// The matrix is not positive definite, or not invertible, in double precision.
     #[error("the system of {unknowns} unknowns is singular in double precision")]
     Singular {
@@ -45,6 +45,14 @@ pub enum Error {
         /// The order of the matrix.
         unknowns: usize,
     },
+}
+
+/// Why a system was not solved.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// It cannot be.
+    #[error(transparent)]
+    Unsolvable(#[from] Unsolvable),
     /// The solution was not wanted any more.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
@@ -64,11 +72,11 @@ impl Pattern {
     pub fn new<const N: usize>(unknowns: usize, elements: &[[u32; N]]) -> Self {
         let all = || elements.iter().flat_map(entries);
         let of_columns = || all().zip(0_u32..).filter(|(e, _)| e.0 != PRESCRIBED);
-        let mut columns = Buckets::new(unknowns, || of_columns().map(|((row, column), i)| (column, (row, i))));
+        let mut columns = Csr::sorted(unknowns, || of_columns().map(|((row, column), i)| (column, (row, i))));
         let slots = vec![PRESCRIBED; elements.len() * N * (N + 1) / 2];
         let mut pattern = Self { unknowns, starts: vec![0], rows: Vec::new(), slots };
         for j in 0..unknowns {
-            let column = columns.get_mut(j);
+            let column = columns.row_mut(j);
             column.sort_unstable();
             for run in column.chunk_by(|a, b| a.0 == b.0) {
                 run.iter().for_each(|(_, i)| pattern.slots[*i as usize] = pattern.rows.len() as u32);
@@ -105,25 +113,25 @@ impl Pattern {
     /// pattern.
     ///
     /// # Errors
-    /// [`Error::TooLarge`].
-    pub fn analyse(&self) -> Result<Analysis<'_>, Error> {
+    /// [`Unsolvable::TooLarge`].
+    pub fn analyse(&self) -> Result<Analysis<'_>, Unsolvable> {
         self.analyse_in(SymmetricOrdering::Amd)
     }
 
     /// As [`Self::analyse`], for unknowns that are numbered in the order in which to eliminate them.
     ///
     /// # Errors
-    /// [`Error::TooLarge`].
-    pub fn analyse_as_numbered(&self) -> Result<Analysis<'_>, Error> {
+    /// [`Unsolvable::TooLarge`].
+    pub fn analyse_as_numbered(&self) -> Result<Analysis<'_>, Unsolvable> {
         // Not `SymmetricOrdering::Identity`, which takes the triangle below the diagonal for the one above it.
         let identity: Vec<u32> = (0..self.unknowns as u32).collect();
         self.analyse_in(SymmetricOrdering::Custom(PermRef::new_checked(&identity, &identity, self.unknowns)))
     }
 
-    fn analyse_in(&self, order: SymmetricOrdering<u32>) -> Result<Analysis<'_>, Error> {
+    fn analyse_in(&self, order: SymmetricOrdering<u32>) -> Result<Analysis<'_>, Unsolvable> {
         let symbolic = factorize_symbolic_cholesky(self.view(), Side::Lower, order, Default::default());
-        let fits = |s: &SymbolicCholesky<u32>| s.len_val() <= LARGEST_FACTOR / size_of::<f64>();
-        let symbolic = symbolic.ok().filter(fits).ok_or(Error::TooLarge { unknowns: self.unknowns })?;
+        let fits = |s: &SymbolicCholesky<u32>| s.len_val() <= MAX_FACTOR_BYTES / size_of::<f64>();
+        let symbolic = symbolic.ok().filter(fits).ok_or(Unsolvable::TooLarge { unknowns: self.unknowns })?;
         Ok(Analysis { pattern: self, symbolic })
     }
 
@@ -173,14 +181,14 @@ impl Analysis<'_> {
     /// making it is reserved until the factor is dropped.
     ///
     /// # Errors
-    /// [`Error::Singular`] when a pivot is not positive, [`Error::TooLarge`] when memory is short,
-    /// [`Error::Interrupted`].
+    /// [`Unsolvable::Singular`] when a pivot is not positive, [`Unsolvable::TooLarge`] when memory is short; or
+    /// [`Interrupted`].
     pub fn factorise<'a>(&'a self, values: &[f64], monitor: &'a dyn Monitor) -> Result<Factor<'a>, Error> {
-        if self.factor_entries() > SMALL && !monitor.should_continue() {
+        if self.factor_entries() > MAX_SMALL_ENTRIES && !monitor.should_continue() {
             return Err(Interrupted.into());
         }
         let unknowns = self.pattern.unknowns;
-        let too_large = Error::TooLarge { unknowns };
+        let too_large = Unsolvable::TooLarge { unknowns };
         let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
         let bytes = size_of::<f64>() * self.factor_entries() + scratch.unaligned_bytes_required();
         // Before what it stands for, and so dropped after that.
@@ -194,7 +202,7 @@ impl Analysis<'_> {
         let side = Side::Lower;
         self.symbolic
             .factorize_numeric_llt(&mut factor, matrix, side, Default::default(), Par::Seq, stack, Default::default())
-            .map_err(|_| Error::Singular { unknowns })?;
+            .map_err(|_| Unsolvable::Singular { unknowns })?;
         Ok(Factor { symbolic: &self.symbolic, values: factor, _reserved: reserved })
     }
 }
@@ -223,23 +231,23 @@ impl Factor<'_> {
 /// right-hand sides in place. An estimate of the memory that it takes is reserved.
 ///
 /// # Errors
-/// [`Error::Singular`], [`Error::TooLarge`].
+/// [`Unsolvable`].
 pub fn solve_general(
     unknowns: usize,
     entries: &[(u32, u32, f64)],
     rhs: &mut [f64],
     columns: usize,
     monitor: &dyn Monitor,
-) -> Result<(), Error> {
+) -> Result<(), Unsolvable> {
     let bytes = GROWTH * entries.len() * (size_of::<u32>() + size_of::<f64>());
     let _reserved = Reserved::new(monitor, bytes as u64);
     let triplets: Vec<_> = entries.iter().map(|(r, c, v)| Triplet::new(*r, *c, *v)).collect();
     let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(unknowns, unknowns, &triplets)
-        .map_err(|_| Error::TooLarge { unknowns })?;
-    let symbolic = SymbolicLu::try_new(matrix.symbolic()).map_err(|_| Error::TooLarge { unknowns })?;
-    let factor = Lu::try_new_with_symbolic(symbolic, matrix.rb()).map_err(|_| Error::Singular { unknowns })?;
+        .map_err(|_| Unsolvable::TooLarge { unknowns })?;
+    let symbolic = SymbolicLu::try_new(matrix.symbolic()).map_err(|_| Unsolvable::TooLarge { unknowns })?;
+    let factor = Lu::try_new_with_symbolic(symbolic, matrix.rb()).map_err(|_| Unsolvable::Singular { unknowns })?;
     factor.solve_in_place(MatMut::from_column_major_slice_mut(rhs, unknowns, columns));
-    if rhs.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(Error::Singular { unknowns }) }
+    if rhs.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(Unsolvable::Singular { unknowns }) }
 }
 
 #[cfg(test)]
@@ -277,7 +285,7 @@ mod tests {
         let mut values = pattern.zeros();
         pattern.add(&mut values, 0, &[[1.0, -1.0], [-1.0, 1.0]]);
         let analysis = pattern.analyse().expect("small");
-        assert_eq!(analysis.factorise(&values, &NoMonitor).err(), Some(Error::Singular { unknowns: 2 }));
+        assert_eq!(analysis.factorise(&values, &NoMonitor).err(), Some(Unsolvable::Singular { unknowns: 2 }.into()));
     }
 
     #[test]

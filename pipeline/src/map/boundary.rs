@@ -5,7 +5,7 @@
 //! The boundary is chosen once: the harmonic map, the feasible start and the result share it.
 
 use crate::grid::GridPoint;
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use std::f64::consts::TAU;
 
 /// The shortest edge, relative to the mean, as far as its arc is concerned.
@@ -23,7 +23,7 @@ pub enum Mids {
     Chord,
 }
 
-/// The outer loop in the plane, in the order of [`ClosedChart::outer`].
+/// The outer loop in the plane, in the order of [`FilledChart::outer`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Boundary {
     /// Per half-edge of the loop, the place of the vertex it begins at.
@@ -47,7 +47,7 @@ pub enum Error {
 
 impl Boundary {
     /// The loop on the unit circle, by arc length, counter-clockwise from (1, 0).
-    pub fn circle(chart: &ClosedChart, mids: Mids) -> Self {
+    pub fn circle(chart: &FilledChart, mids: Mids) -> Self {
         let outer = chart.outer();
         let lengths: Vec<f64> = outer.iter().map(|h| chart.shapes()[h.face().index()].lengths[h.side()]).collect();
         let shares = arc_shares(&lengths);
@@ -62,11 +62,11 @@ impl Boundary {
         Self { vertices, mids: middle }.with_mids(mids)
     }
 
-    /// The loop on prescribed points, in the order of [`ClosedChart::outer`]; arcs are those of the unit circle.
+    /// The loop on prescribed points, in the order of [`FilledChart::outer`]; arcs are those of the unit circle.
     ///
     /// # Errors
     /// [`Error::Count`].
-    pub fn prescribed(chart: &ClosedChart, points: &[[f64; 2]], mids: Mids) -> Result<Self, Error> {
+    pub fn prescribed(chart: &FilledChart, points: &[[f64; 2]], mids: Mids) -> Result<Self, Error> {
         let bisector = |i: usize| {
             let (p, q) = (points[i], points[(i + 1) % points.len()]);
             let sum = [p[0] + q[0], p[1] + q[1]];
@@ -78,11 +78,11 @@ impl Boundary {
     }
 
     /// The loop on prescribed places of its vertices and of its mid-edge nodes, both in the order of
-    /// [`ClosedChart::outer`].
+    /// [`FilledChart::outer`].
     ///
     /// # Errors
     /// [`Error::Count`].
-    pub fn through(chart: &ClosedChart, vertices: &[[f64; 2]], mids: &[[f64; 2]]) -> Result<Self, Error> {
+    pub fn through(chart: &FilledChart, vertices: &[[f64; 2]], mids: &[[f64; 2]]) -> Result<Self, Error> {
         let needed = chart.outer().len();
         if let Some(given) = [vertices.len(), mids.len()].into_iter().find(|n| *n != needed) {
             return Err(Error::Count { given, needed });
@@ -115,7 +115,7 @@ impl Boundary {
 
     /// Moves the mid-edge node of edge `i` from the arc towards the chord: to the chord (`all_the_way`), or
     /// half-way there.
-    pub(crate) fn lower(&mut self, i: usize, all_the_way: bool) {
+    pub(crate) fn flatten(&mut self, i: usize, all_the_way: bool) {
         let (m, c) = (self.mids[i], self.chord(i));
         self.mids[i] = if all_the_way { c } else { GridPoint { x: (m.x + c.x) / 2, y: (m.y + c.y) / 2 } };
     }
@@ -125,9 +125,9 @@ impl Boundary {
 /// mean, none above [`LONGEST`] of the turn.
 fn arc_shares(lengths: &[f64]) -> Vec<f64> {
     let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
-    let raised: Vec<f64> = lengths.iter().map(|l| l.max(SHORTEST * mean)).collect();
-    let total: f64 = raised.iter().sum();
-    let mut shares: Vec<f64> = raised.iter().map(|l| l / total).collect();
+    let lengthened: Vec<f64> = lengths.iter().map(|l| l.max(SHORTEST * mean)).collect();
+    let total: f64 = lengthened.iter().sum();
+    let mut shares: Vec<f64> = lengthened.iter().map(|l| l / total).collect();
     // At most two edges can be too long; giving what they lose to the others makes at most one more too long.
     for _ in 0..3 {
         let long = |share: &f64| *share >= LONGEST;

@@ -10,12 +10,14 @@
 //!
 //! Guarantees: in a [`LinearMap`] every triangle, those of virtual fans included, turns left, exactly.
 
-use crate::fem::sparse::{self, Analysis, PRESCRIBED, Pattern};
+use crate::fem::assembly::Assembly;
+use crate::fem::dofs::Dofs;
+use crate::fem::sparse::{self, Analysis, Pattern, Unsolvable};
 use crate::grid::{GridPoint, orientation};
 use crate::map::boundary::Boundary;
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use crate::map::weights;
-use crate::monitor::Monitor;
+use crate::monitor::{Interrupted, Monitor};
 use crate::topology::{EdgeId, FaceId, HalfEdgeId};
 
 /// After this many rounds of local changes, all negative edges are changed at once.
@@ -35,7 +37,7 @@ pub enum Method {
 /// A P1 map onto the disk in which no triangle is folded.
 #[derive(Clone, Debug)]
 pub struct LinearMap {
-    places: Vec<GridPoint>,
+    uv: Vec<GridPoint>,
     folded: usize,
     edges_changed: usize,
     method: Method,
@@ -57,13 +59,25 @@ pub enum Error {
     },
     /// The system could not be solved.
     #[error("linear map: {0}")]
-    Solver(#[from] sparse::Error),
+    Solver(#[from] sparse::Unsolvable),
+    /// The map was not wanted any more.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+impl From<sparse::Error> for Error {
+    fn from(error: sparse::Error) -> Self {
+        match error {
+            sparse::Error::Unsolvable(unsolvable) => Self::Solver(unsolvable),
+            sparse::Error::Interrupted(interrupted) => Self::Interrupted(interrupted),
+        }
+    }
 }
 
 impl LinearMap {
-    /// The places of the vertices, those of the fans' centres last.
-    pub fn places(&self) -> &[GridPoint] {
-        &self.places
+    /// The uv coordinates of the vertices, those of the fans' centres last.
+    pub fn uv(&self) -> &[GridPoint] {
+        &self.uv
     }
 
     /// How many triangles the harmonic map folds.
@@ -81,14 +95,14 @@ impl LinearMap {
         self.method
     }
 
-    /// The map as a quadratic one, over the nodes of the closed chart: mid-edge nodes in the middle of straight
+    /// The map as a quadratic one, over the nodes of the filled chart: mid-edge nodes in the middle of straight
     /// edges, those of the outer loop where the boundary has them.
-    pub fn raised(&self, chart: &ClosedChart, boundary: &Boundary) -> Vec<GridPoint> {
+    pub fn degree_elevated(&self, chart: &FilledChart, boundary: &Boundary) -> Vec<GridPoint> {
         let mut nodes = vec![GridPoint::default(); chart.node_count()];
         for (f, t) in chart.triangles().iter().enumerate() {
             for (k, v) in t.iter().enumerate() {
-                let [a, b] = chart.ends(HalfEdgeId::at(3 * f + k)).map(|v| self.places[v.index()]);
-                nodes[chart.vertex_node(*v)] = self.places[v.index()];
+                let [a, b] = chart.ends(HalfEdgeId::at(3 * f + k)).map(|v| self.uv[v.index()]);
+                nodes[chart.vertex_node(*v)] = self.uv[v.index()];
                 nodes[chart.mid_node(HalfEdgeId::at(3 * f + k))] = a.midpoint(b);
             }
         }
@@ -102,46 +116,47 @@ impl LinearMap {
 /// Maps `chart` with its outer loop on the vertices of `boundary`.
 ///
 /// # Errors
-/// [`Error::Folded`] when the chart must be split; [`Error::Solver`].
-pub fn linear_map(chart: &ClosedChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<LinearMap, Error> {
-    let unknowns = Unknowns::new(chart, boundary);
-    let pattern = unknowns.pattern(chart);
-    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, monitor };
+/// [`Error::Folded`] when the chart must be split; [`Error::Solver`]; [`Error::Interrupted`].
+pub fn linear_map(chart: &FilledChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<LinearMap, Error> {
+    let dofs = dofs(chart);
+    let pattern = edge_pattern(chart, &dofs);
+    let analysis = pattern.analyse_as_numbered()?;
+    let system = System { chart, dofs: &dofs, prescribed: prescribed(chart, boundary), analysis, monitor };
     let harmonic = weights::harmonic(chart);
-    let (places, mut folds) = attempt(&system, &harmonic)?;
+    let (uv, mut folds) = attempt(&system, &harmonic)?;
     let count = folds.len();
     if count == 0 {
-        return Ok(LinearMap { places, folded: 0, edges_changed: 0, method: Method::Harmonic });
+        return Ok(LinearMap { uv, folded: 0, edges_changed: 0, method: Method::Harmonic });
     }
     let mean_value = weights::mean_value(chart);
-    let raised = weights::replacements(chart, &harmonic, &mean_value);
+    let positive = weights::replacements(chart, &harmonic, &mean_value);
     let mut changed = vec![false; harmonic.len()];
     for round in 0..=LOCAL_ROUNDS {
         if !grow(chart, &harmonic, &folds, round == LOCAL_ROUNDS, &mut changed) {
             continue;
         }
-        let pick = |e: usize| if changed[e] { raised[e] } else { harmonic[e] };
-        let mixed: Vec<f64> = (0..harmonic.len()).map(pick).collect();
-        let places;
-        (places, folds) = attempt(&system, &mixed)?;
+        let pick = |e: usize| if changed[e] { positive[e] } else { harmonic[e] };
+        let weights: Vec<f64> = (0..harmonic.len()).map(pick).collect();
+        let uv;
+        (uv, folds) = attempt(&system, &weights)?;
         if folds.is_empty() {
             let edges_changed = changed.iter().filter(|c| **c).count();
-            return Ok(LinearMap { places, folded: count, edges_changed, method: Method::MMatrix });
+            return Ok(LinearMap { uv, folded: count, edges_changed, method: Method::MMatrix });
         }
     }
     let map = mean_value_map(chart, boundary, monitor)?;
     Ok(LinearMap { folded: count, ..map })
 }
 
-/// The places by symmetric weights and the triangles folded there: all of them, where the matrix is not positive
+/// The coordinates by symmetric weights and the triangles folded there: all of them, where the matrix is not positive
 /// definite in doubles.
 fn attempt(system: &System, weights: &[f64]) -> Result<(Vec<GridPoint>, Vec<FaceId>), Error> {
     match system.solve(weights) {
-        Ok(places) => {
-            let folds = folded(system.chart, &places);
-            Ok((places, folds))
+        Ok(uv) => {
+            let folds = folded(system.chart, &uv);
+            Ok((uv, folds))
         }
-        Err(sparse::Error::Singular { .. }) => {
+        Err(sparse::Error::Unsolvable(Unsolvable::Singular { .. })) => {
             Ok((Vec::new(), (0..system.chart.triangles().len()).map(FaceId::at).collect()))
         }
         Err(error) => Err(error.into()),
@@ -152,40 +167,37 @@ fn attempt(system: &System, weights: &[f64]) -> Result<(Vec<GridPoint>, Vec<Face
 ///
 /// # Errors
 /// As [`linear_map`].
-pub fn mean_value_map(chart: &ClosedChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<LinearMap, Error> {
-    let places = solve_mean_value(chart, boundary, &weights::mean_value(chart), monitor)?;
-    let folds = folded(chart, &places);
+pub fn mean_value_map(chart: &FilledChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<LinearMap, Error> {
+    let uv = solve_mean_value(chart, boundary, &weights::mean_value(chart), monitor)?;
+    let folds = folded(chart, &uv);
     match folds.first() {
         Some(first) => Err(Error::Folded { folded: folds.len(), first: *first }),
-        None => Ok(LinearMap { places, folded: 0, edges_changed: chart.edges().len(), method: Method::MeanValue }),
+        None => Ok(LinearMap { uv, folded: 0, edges_changed: chart.edges().len(), method: Method::MeanValue }),
     }
 }
 
 /// The harmonic P1 map as it is, folded or not: per vertex its place.
 ///
 /// # Errors
-/// [`Error::Solver`].
-pub fn harmonic_places(
-    chart: &ClosedChart,
-    boundary: &Boundary,
-    monitor: &dyn Monitor,
-) -> Result<Vec<GridPoint>, Error> {
-    let unknowns = Unknowns::new(chart, boundary);
-    let pattern = unknowns.pattern(chart);
-    let system = System { chart, unknowns: &unknowns, analysis: pattern.analyse_as_numbered()?, monitor };
+/// [`Error::Solver`]; [`Error::Interrupted`].
+pub fn harmonic_uv(chart: &FilledChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<Vec<GridPoint>, Error> {
+    let dofs = dofs(chart);
+    let pattern = edge_pattern(chart, &dofs);
+    let analysis = pattern.analyse_as_numbered()?;
+    let system = System { chart, dofs: &dofs, prescribed: prescribed(chart, boundary), analysis, monitor };
     Ok(system.solve(&weights::harmonic(chart))?)
 }
 
 /// The triangles that do not turn left, exactly.
-pub fn folded(chart: &ClosedChart, places: &[GridPoint]) -> Vec<FaceId> {
-    let place = |t: &[crate::topology::VertexId; 3]| t.map(|v| places[v.index()]);
+pub fn folded(chart: &FilledChart, uv: &[GridPoint]) -> Vec<FaceId> {
+    let corners = |t: &[crate::topology::VertexId; 3]| t.map(|v| uv[v.index()]);
     let turns_left = |p: [GridPoint; 3]| orientation(p[0], p[1], p[2]) > 0;
     let all = chart.triangles().iter().enumerate();
-    all.filter(|(_, t)| !turns_left(place(t))).map(|(f, _)| FaceId::at(f)).collect()
+    all.filter(|(_, t)| !turns_left(corners(t))).map(|(f, _)| FaceId::at(f)).collect()
 }
 
 /// Marks the negative edges at the vertices of folded triangles (or all of them); whether that marked any more.
-fn grow(chart: &ClosedChart, harmonic: &[f64], folds: &[FaceId], everywhere: bool, changed: &mut [bool]) -> bool {
+fn grow(chart: &FilledChart, harmonic: &[f64], folds: &[FaceId], everywhere: bool, changed: &mut [bool]) -> bool {
     let mut near = vec![everywhere; chart.vertex_count()];
     folds.iter().flat_map(|f| chart.triangles()[f.index()]).for_each(|v| near[v.index()] = true);
     let mut grown = false;
@@ -199,132 +211,109 @@ fn grow(chart: &ClosedChart, harmonic: &[f64], folds: &[FaceId], everywhere: boo
     grown
 }
 
-/// The unknowns of a linear map: vertices that are not on the outer loop, numbered in the order of elimination, and
-/// where those on it are.
-struct Unknowns {
-    number: Vec<u32>,
-    fixed: Vec<[f64; 2]>,
-    count: usize,
+/// The unknowns of a linear map: vertices that are not on the outer loop, in the order of elimination.
+fn dofs(chart: &FilledChart) -> Dofs {
+    Dofs::new(chart.vertex_count(), chart.elimination().iter().map(|v| v.0).collect())
 }
 
-impl Unknowns {
-    fn new(chart: &ClosedChart, boundary: &Boundary) -> Self {
-        let mut number = vec![PRESCRIBED; chart.vertex_count()];
-        let mut fixed = vec![[0.0; 2]; chart.vertex_count()];
-        for (h, place) in chart.outer().iter().zip(boundary.vertices()) {
-            fixed[chart.ends(*h)[0].index()] = place.uv();
-        }
-        chart.elimination().iter().zip(0..).for_each(|(v, n)| number[v.index()] = n);
-        Self { number, fixed, count: chart.elimination().len() }
+/// Per vertex where `boundary` has it; the origin inside.
+fn prescribed(chart: &FilledChart, boundary: &Boundary) -> Vec<[f64; 2]> {
+    let mut uv = vec![[0.0; 2]; chart.vertex_count()];
+    for (h, place) in chart.outer().iter().zip(boundary.vertices()) {
+        uv[chart.ends(*h)[0].index()] = place.uv();
     }
-
-    /// The pattern of one element per edge.
-    fn pattern(&self, chart: &ClosedChart) -> Pattern {
-        let element = |e: usize| edge_ends(chart, e).map(|v| self.number[v]);
-        Pattern::new(self.count, &(0..chart.edges().len()).map(element).collect::<Vec<_>>())
-    }
-
-    /// Adds `weight` times the places of prescribed neighbours to the right-hand side.
-    fn pull(&self, rhs: &mut [f64], unknown: u32, neighbour: usize, weight: f64) {
-        if unknown != PRESCRIBED && self.number[neighbour] == PRESCRIBED {
-            rhs[unknown as usize] += weight * self.fixed[neighbour][0];
-            rhs[self.count + unknown as usize] += weight * self.fixed[neighbour][1];
-        }
-    }
-
-    /// The places of all vertices, on the grid.
-    fn places(&self, solution: &[f64]) -> Vec<GridPoint> {
-        let free = |n: u32| [solution[n as usize], solution[self.count + n as usize]];
-        let uv = self.number.iter().zip(&self.fixed).map(|(n, f)| if *n == PRESCRIBED { *f } else { free(*n) });
-        uv.map(GridPoint::vertex).collect()
-    }
+    uv
 }
 
-/// The system for the places of the vertices by one weight per edge, analysed once for all weights.
+/// The pattern of one element per edge.
+fn edge_pattern(chart: &FilledChart, dofs: &Dofs) -> Pattern {
+    dofs.pattern((0..chart.edges().len()).map(|e| edge_ends(chart, e)))
+}
+
+/// The system for the uv coordinates of the vertices by one weight per edge, analysed once for all weights.
 struct System<'a> {
-    chart: &'a ClosedChart,
-    unknowns: &'a Unknowns,
+    chart: &'a FilledChart,
+    dofs: &'a Dofs,
+    prescribed: Vec<[f64; 2]>,
     analysis: Analysis<'a>,
     monitor: &'a dyn Monitor,
 }
 
 impl System<'_> {
     fn solve(&self, weights: &[f64]) -> Result<Vec<GridPoint>, sparse::Error> {
-        let Self { chart, unknowns, analysis, monitor } = self;
-        let mut values = analysis.pattern().zeros();
-        let mut rhs = vec![0.0; 2 * unknowns.count];
+        let mut system = Assembly::new(self.dofs, self.analysis.pattern(), self.prescribed.clone());
         for (e, w) in weights.iter().enumerate() {
-            analysis.pattern().add(&mut values, e, &[[*w, -w], [-w, *w]]);
-            let [a, b] = edge_ends(chart, e);
-            unknowns.pull(&mut rhs, unknowns.number[a], b, *w);
-            unknowns.pull(&mut rhs, unknowns.number[b], a, *w);
+            system.add(e, &edge_ends(self.chart, e), &[[*w, -w], [-w, *w]]);
         }
-        if unknowns.count > 0 {
-            analysis.factorise(&values, *monitor)?.solve(&mut rhs, 2);
-        }
-        Ok(unknowns.places(&rhs))
+        Ok(on_grid(&system.solve(&self.analysis, self.monitor)?))
     }
 }
 
+fn on_grid(uv: &[[f64; 2]]) -> Vec<GridPoint> {
+    uv.iter().map(|p| GridPoint::vertex(*p)).collect()
+}
+
 /// The vertices at both ends of an edge.
-fn edge_ends(chart: &ClosedChart, edge: usize) -> [usize; 2] {
+fn edge_ends(chart: &FilledChart, edge: usize) -> [usize; 2] {
     chart.ends(chart.edges().sides(EdgeId::at(edge))[0]).map(|v| v.index())
 }
 
-/// Solves for the places of the vertices with weights that differ between the ends of an edge.
+/// Solves for the uv coordinates of the vertices with weights that differ between the ends of an edge.
 fn solve_mean_value(
-    chart: &ClosedChart,
+    chart: &FilledChart,
     boundary: &Boundary,
     weights: &[[f64; 2]],
     monitor: &dyn Monitor,
 ) -> Result<Vec<GridPoint>, Error> {
-    let unknowns = Unknowns::new(chart, boundary);
+    let dofs = dofs(chart);
+    let mut uv = prescribed(chart, boundary);
     let mut entries = Vec::new();
-    let mut rhs = vec![0.0; 2 * unknowns.count];
-    let mut row_sums = vec![0.0; unknowns.count];
+    let mut rhs = vec![0.0; 2 * dofs.count()];
+    let mut row_sums = vec![0.0; dofs.count()];
     for (e, sides) in chart.edges().iter() {
         let [a, b] = chart.ends(sides[0]).map(|v| v.index());
         for (from, to, w) in [(a, b, weights[e.index()][0]), (b, a, weights[e.index()][1])] {
-            let (row, column) = (unknowns.number[from], unknowns.number[to]);
-            unknowns.pull(&mut rhs, row, to, w);
-            if row != PRESCRIBED {
-                row_sums[row as usize] += w;
-            }
-            if row != PRESCRIBED && column != PRESCRIBED {
-                entries.push((row, column, -w));
+            let Some(row) = dofs.unknown(from) else { continue };
+            row_sums[row] += w;
+            match dofs.unknown(to) {
+                Some(column) => entries.push((row as u32, column as u32, -w)),
+                None => dofs.add_prescribed(&mut rhs, row, to, w, &uv),
             }
         }
     }
     entries.extend(row_sums.iter().enumerate().map(|(i, s)| (i as u32, i as u32, *s)));
-    if unknowns.count > 0 {
-        sparse::solve_general(unknowns.count, &entries, &mut rhs, 2, monitor)?;
+    if dofs.count() > 0 {
+        sparse::solve_general(dofs.count(), &entries, &mut rhs, 2, monitor)?;
+        dofs.scatter(&rhs, &mut uv);
     }
-    Ok(unknowns.places(&rhs))
+    Ok(on_grid(&uv))
 }
 
-/// Lowers mid-edge nodes of `boundary` where the raised map would come close to a folded corner: where a triangle
+/// Lowers mid-edge nodes of `boundary` where the degree-elevated map would come close to a folded corner: where a triangle
 /// has two boundary edges (an ear), its corner angle on a smooth boundary tends to pi. The node goes half-way to
 /// the chord, and if that is not enough, to the chord.
-pub fn lower_ears(chart: &ClosedChart, linear: &LinearMap, boundary: &mut Boundary) {
+pub fn flatten_ear_arcs(chart: &FilledChart, linear: &LinearMap, boundary: &mut Boundary) {
     /// The least coefficient that is left alone, relative to that of the straight triangle.
     const MARGIN: f64 = 0.01;
-    let mut nodes = linear.raised(chart, boundary);
+    let mut nodes = linear.degree_elevated(chart, boundary);
     // The edges of one triangle are lowered together, so that no order of them decides.
-    let mut edges: Vec<(usize, usize)> = chart.outer().iter().map(|h| h.face().index()).zip(0..).collect();
-    edges.sort_unstable();
-    for ear in edges.chunk_by(|a, b| a.0 == b.0) {
-        let face = ear[0].0;
-        let [p, q, r] = chart.triangles()[face].map(|v| linear.places[v.index()]);
+    let outer = chart.outer();
+    let face_of = |edge: usize| outer[edge].face().index();
+    let mut edges: Vec<usize> = (0..outer.len()).collect();
+    edges.sort_by_key(|edge| face_of(*edge));
+    for ear in edges.chunk_by(|a, b| face_of(*a) == face_of(*b)) {
+        let face = face_of(ear[0]);
+        let [p, q, r] = chart.triangles()[face].map(|v| linear.uv[v.index()]);
         let straight = 2.0 * orientation(p, q, r) as f64;
         for all_the_way in [false, true] {
-            let det = crate::fem::bernstein::ExactDet::new(chart.nodes(face).map(|n| nodes[n]));
+            let det = crate::fem::bernstein::JacobianBezier::new(chart.nodes(face).map(|n| nodes[n]));
             let least = det.corner.iter().chain(&det.edge).fold(f64::INFINITY, |m, c| m.min(*c as f64));
             if least > MARGIN * straight {
                 break;
             }
-            for (_, i) in ear {
-                boundary.lower(*i, all_the_way);
-                nodes[chart.mid_node(chart.outer()[*i])] = boundary.mids()[*i];
+            for edge in ear {
+                boundary.flatten(*edge, all_the_way);
+                nodes[chart.mid_node(outer[*edge])] = boundary.mids()[*edge];
             }
         }
     }
@@ -339,13 +328,13 @@ mod tests {
     use crate::monitor::NoMonitor;
     use crate::{decompose, repair, shapes};
 
-    fn closed(soup: &TriangleSoup) -> ClosedChart {
+    fn filled(soup: &TriangleSoup) -> FilledChart {
         let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
-        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
+        FilledChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0])
     }
 
-    fn valid(chart: &ClosedChart, nodes: &[GridPoint]) -> bool {
-        let det = |f: usize| bernstein::ExactDet::new(chart.nodes(f).map(|n| nodes[n]));
+    fn valid(chart: &FilledChart, nodes: &[GridPoint]) -> bool {
+        let det = |f: usize| bernstein::JacobianBezier::new(chart.nodes(f).map(|n| nodes[n]));
         (0..chart.triangles().len()).all(|f| det(f).validity() != bernstein::Validity::Invalid)
     }
 
@@ -362,23 +351,23 @@ mod tests {
             shapes::finger(12, 3),
         ];
         for (i, soup) in shapes.iter().enumerate() {
-            let chart = closed(soup);
+            let chart = filled(soup);
             let mut boundary = Boundary::circle(&chart, Mids::Arc);
             let linear = linear_map(&chart, &boundary, &NoMonitor).expect("maps");
-            assert!(folded(&chart, linear.places()).is_empty());
-            lower_ears(&chart, &linear, &mut boundary);
-            assert!(valid(&chart, &linear.raised(&chart, &boundary)), "shape {i}");
+            assert!(folded(&chart, linear.uv()).is_empty());
+            flatten_ear_arcs(&chart, &linear, &mut boundary);
+            assert!(valid(&chart, &linear.degree_elevated(&chart, &boundary)), "shape {i}");
             let mean_value = mean_value_map(&chart, &boundary, &NoMonitor).expect("maps");
-            assert!(folded(&chart, mean_value.places()).is_empty());
+            assert!(folded(&chart, mean_value.uv()).is_empty());
         }
     }
 
     #[test]
     fn the_m_matrix_unfolds_what_the_harmonic_map_folds() {
         for soup in [shapes::folding_three(), shapes::folding_six()] {
-            let chart = closed(&soup);
+            let chart = filled(&soup);
             let boundary = Boundary::circle(&chart, Mids::Arc);
-            assert_eq!(folded(&chart, &harmonic_places(&chart, &boundary, &NoMonitor).expect("solves")).len(), 1);
+            assert_eq!(folded(&chart, &harmonic_uv(&chart, &boundary, &NoMonitor).expect("solves")).len(), 1);
             let map = linear_map(&chart, &boundary, &NoMonitor).expect("maps");
             assert_eq!((map.folded(), map.method()), (1, Method::MMatrix));
             assert!(map.edges_changed() > 0);
@@ -387,7 +376,7 @@ mod tests {
 
     #[test]
     fn a_map_beyond_double_precision_is_refused() {
-        let chart = closed(&shapes::finger(12, 22));
+        let chart = filled(&shapes::finger(12, 22));
         let boundary = Boundary::circle(&chart, Mids::Arc);
         let refused = linear_map(&chart, &boundary, &NoMonitor);
         assert!(matches!(refused, Err(Error::Folded { .. })), "area ratio e^88: {refused:?}");

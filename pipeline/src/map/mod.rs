@@ -1,7 +1,7 @@
 //! Maps of charts to the plane: linear, quadratic, and those with a boundary of their own.
 
 pub mod boundary;
-pub mod closed;
+pub mod filled;
 pub mod linear;
 pub mod natural;
 pub mod quadratic;

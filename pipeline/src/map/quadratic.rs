@@ -5,34 +5,36 @@
 //! metric is constant. The map minimises the Dirichlet energy among all quadratic maps with these boundary
 //! values; it need not be valid, and typically a few triangles in a thousand are not.
 
-use crate::fem::bernstein::{self, ExactDet, Validity};
-use crate::fem::element;
+use crate::fem::bernstein::{self, JacobianBezier, Validity};
+use crate::fem::dofs::Dofs;
+use crate::fem::element::{self, Element, P2};
 use crate::fem::elimination;
-use crate::fem::jacobian::Corners;
-use crate::fem::sparse::{self, PRESCRIBED, Pattern};
+use crate::fem::jacobian::CornerDerivatives;
+use crate::fem::laplace;
+use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::map::boundary::Boundary;
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use crate::monitor::{Checkpoint, Monitor};
 use crate::topology::FaceId;
 
 /// The harmonic map by quadratic elements, valid or not.
 #[derive(Clone, Debug)]
 pub struct QuadraticMap {
-    places: Vec<[f64; 2]>,
+    uv: Vec<[f64; 2]>,
     nodes: Vec<GridPoint>,
     invalid: Vec<FaceId>,
     energy: f64,
 }
 
 impl QuadraticMap {
-    /// The places of all nodes of the closed chart, as they were solved for. They may lie far outside the disk: there
+    /// The uv of all nodes of the filled chart, as they were solved for. They may lie far outside the disk: there
     /// is no maximum principle for quadratic elements.
-    pub fn places(&self) -> &[[f64; 2]] {
-        &self.places
+    pub fn uv(&self) -> &[[f64; 2]] {
+        &self.uv
     }
 
-    /// The places of all nodes of the closed chart, on the grid.
+    /// The uv of all nodes of the filled chart, on the grid.
     pub fn nodes(&self) -> &[GridPoint] {
         &self.nodes
     }
@@ -51,119 +53,81 @@ impl QuadraticMap {
 /// Computes the harmonic map of `chart` with its outer loop on `boundary`.
 ///
 /// # Errors
-/// [`sparse::Error`] when the system cannot be factorised.
+/// [`sparse::Error`]: the system cannot be factorised, or interrupted.
 pub fn quadratic_map(
-    chart: &ClosedChart,
+    chart: &FilledChart,
     boundary: &Boundary,
     monitor: &dyn Monitor,
 ) -> Result<QuadraticMap, sparse::Error> {
     let checkpoint = Checkpoint::new(monitor);
-    let mut number = vec![0_u32; chart.node_count()];
-    let mut uv = vec![[0.0; 2]; chart.node_count()];
-    for (i, h) in chart.outer().iter().enumerate() {
-        let vertex = chart.vertex_node(chart.ends(*h)[0]);
-        for (node, place) in [(vertex, boundary.vertices()[i]), (chart.mid_node(*h), boundary.mids()[i])] {
-            number[node] = PRESCRIBED;
-            uv[node] = place.uv();
-        }
-    }
-    let mut unknowns = 0;
-    for node in elimination::of_nodes(chart) {
-        if number[node] != PRESCRIBED {
-            number[node] = unknowns;
-            unknowns += 1;
-        }
-    }
-    let solution = solve(chart, &number, &uv, unknowns as usize, &checkpoint)?;
-    for (node, n) in number.iter().enumerate().filter(|(_, n)| **n != PRESCRIBED) {
-        uv[node] = [solution[*n as usize], solution[(unknowns + n) as usize]];
-    }
+    let (dofs, prescribed) = prescribe(chart, boundary);
+    let stiffness = |face: usize| P2::stiffness(&chart.shapes()[face]);
+    let faces = chart.triangles().len();
+    let uv = laplace::harmonic(&dofs, faces, |f| chart.nodes(f), stiffness, prescribed, &checkpoint)?;
     let nodes = to_grid(chart, &uv);
-    checkpoint.after(chart.triangles().len())?;
+    checkpoint.after(faces)?;
     let invalid = invalid_triangles(chart, &nodes);
     // Of the solution itself: the grid ends not far outside the disk, and what was cut off there is no lower bound.
     let energy = energy_of(chart, &uv);
-    Ok(QuadraticMap { places: uv, nodes, invalid, energy })
+    Ok(QuadraticMap { uv, nodes, invalid, energy })
 }
 
-/// Solves both Laplace problems; returns the unknown values of u, then those of v.
-fn solve(
-    chart: &ClosedChart,
-    number: &[u32],
-    uv: &[[f64; 2]],
-    unknowns: usize,
-    checkpoint: &Checkpoint,
-) -> Result<Vec<f64>, sparse::Error> {
-    let faces = 0..chart.triangles().len();
-    let elements: Vec<[u32; 6]> = faces.clone().map(|f| chart.nodes(f).map(|n| number[n])).collect();
-    checkpoint.after(elements.len())?;
-    let pattern = Pattern::new(unknowns, &elements);
-    let mut values = pattern.zeros();
-    let mut rhs = vec![0.0; 2 * unknowns];
-    for f in faces {
-        let stiffness = element::stiffness(&chart.shapes()[f]);
-        pattern.add(&mut values, f, &stiffness);
-        let nodes = chart.nodes(f);
-        for (i, row) in elements[f].iter().enumerate().filter(|(_, r)| **r != PRESCRIBED) {
-            for j in (0..6).filter(|j| elements[f][*j] == PRESCRIBED) {
-                rhs[*row as usize] -= stiffness[i][j] * uv[nodes[j]][0];
-                rhs[unknowns + *row as usize] -= stiffness[i][j] * uv[nodes[j]][1];
-            }
-        }
+/// The unknowns, in the order of elimination: all nodes that are not on the outer loop. And the values of the others.
+fn prescribe(chart: &FilledChart, boundary: &Boundary) -> (Dofs, Vec<[f64; 2]>) {
+    let mut uv = vec![[0.0; 2]; chart.node_count()];
+    for (i, h) in chart.outer().iter().enumerate() {
+        uv[chart.vertex_node(chart.ends(*h)[0])] = boundary.vertices()[i].uv();
+        uv[chart.mid_node(*h)] = boundary.mids()[i].uv();
     }
-    if unknowns > 0 {
-        checkpoint.after(elements.len())?;
-        pattern.analyse_as_numbered()?.factorise(&values, checkpoint.monitor)?.solve(&mut rhs, 2);
-    }
-    Ok(rhs)
+    (elimination::dofs_inside(chart), uv)
 }
 
-/// Rounds the nodes of a closed chart to the grid: vertices to that of vertices, all others to that of mid-edge
+/// Rounds the nodes of a filled chart to the grid: vertices to that of vertices, all others to that of mid-edge
 /// nodes.
-pub(crate) fn to_grid(chart: &ClosedChart, uv: &[[f64; 2]]) -> Vec<GridPoint> {
+pub(crate) fn to_grid(chart: &FilledChart, uv: &[[f64; 2]]) -> Vec<GridPoint> {
     uv.iter().enumerate().map(|(n, p)| node_to_grid(chart, n, *p)).collect()
 }
 
-/// Rounds one node of a closed chart to its grid.
-pub(crate) fn node_to_grid(chart: &ClosedChart, node: usize, uv: [f64; 2]) -> GridPoint {
-    let centres = chart.own_nodes()..chart.own_nodes() + chart.loops().len();
-    let is_vertex = node < chart.own_vertices() || centres.contains(&node);
+/// Rounds one node of a filled chart to its grid.
+pub(crate) fn node_to_grid(chart: &FilledChart, node: usize, uv: [f64; 2]) -> GridPoint {
+    let centres = chart.chart_nodes()..chart.chart_nodes() + chart.loops().len();
+    let is_vertex = node < chart.chart_vertices() || centres.contains(&node);
     if is_vertex { GridPoint::vertex(uv) } else { GridPoint::mid(uv) }
 }
 
 /// The jacobian coefficients of a triangle.
-pub(crate) fn det(chart: &ClosedChart, nodes: &[GridPoint], face: usize) -> ExactDet {
-    ExactDet::new(chart.nodes(face).map(|n| nodes[n]))
+pub(crate) fn det(chart: &FilledChart, nodes: &[GridPoint], face: usize) -> JacobianBezier {
+    JacobianBezier::new(chart.nodes(face).map(|n| nodes[n]))
 }
 
 /// The triangles of the chart (not the fans) that are invalid, exactly.
-pub(crate) fn invalid_triangles(chart: &ClosedChart, nodes: &[GridPoint]) -> Vec<FaceId> {
-    let own = 0..chart.own_triangles();
+pub(crate) fn invalid_triangles(chart: &FilledChart, nodes: &[GridPoint]) -> Vec<FaceId> {
+    let own = 0..chart.chart_triangles();
     own.filter(|f| det(chart, nodes, *f).validity() == Validity::Invalid).map(FaceId::at).collect()
 }
 
 /// The least jacobian of a harmonic map over all triangles of the chart, per unit of mollified area of the triangle in
 /// space, in the unit of the shapes.
-pub fn least_det(chart: &ClosedChart, map: &QuadraticMap) -> f64 {
+pub fn min_det(chart: &FilledChart, map: &QuadraticMap) -> f64 {
     let relative = |f: usize| {
-        let dets = Corners::new(&chart.nodes(f).map(|n| map.places[n])).dets();
-        bernstein::range(dets).0 / (2.0 * chart.shapes()[f].area())
+        let dets = CornerDerivatives::new(&chart.nodes(f).map(|n| map.uv[n])).dets();
+        bernstein::range(dets).min / (2.0 * chart.shapes()[f].area())
     };
-    (0..chart.own_triangles()).map(relative).fold(f64::INFINITY, f64::min)
+    (0..chart.chart_triangles()).map(relative).fold(f64::INFINITY, f64::min)
 }
 
-/// The Dirichlet energy of a map of the closed chart, fans included.
-pub fn energy(chart: &ClosedChart, nodes: &[GridPoint]) -> f64 {
+/// The Dirichlet energy of a map of the filled chart, fans included.
+pub fn energy(chart: &FilledChart, nodes: &[GridPoint]) -> f64 {
     energy_of(chart, &nodes.iter().map(|p| p.uv()).collect::<Vec<_>>())
 }
 
-fn energy_of(chart: &ClosedChart, places: &[[f64; 2]]) -> f64 {
-    energies(chart, places).sum()
+fn energy_of(chart: &FilledChart, uv: &[[f64; 2]]) -> f64 {
+    energies(chart, uv).sum()
 }
 
-/// The Dirichlet energy of every triangle of the closed chart; of `places`, only those of its nodes are used.
-pub(crate) fn energies(chart: &ClosedChart, places: &[[f64; 2]]) -> impl Iterator<Item = f64> {
-    let one = |f: usize| element::energy(&element::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| places[n]));
+/// The Dirichlet energy of every triangle of the filled chart; of `uv`, only those of its nodes are used.
+pub(crate) fn energies(chart: &FilledChart, uv: &[[f64; 2]]) -> impl Iterator<Item = f64> {
+    let one = |f: usize| element::energy(&P2::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| uv[n]));
     (0..chart.triangles().len()).map(one)
 }
 
@@ -178,15 +142,15 @@ mod tests {
     #[test]
     fn the_map_has_no_more_energy_than_the_raised_linear_one() {
         let mesh = repair(&shapes::disk_with_holes(13, 2), &Default::default()).expect("a surface").mesh;
-        let chart = ClosedChart::new(
+        let chart = FilledChart::new(
             &decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0],
         );
         let boundary = Boundary::circle(&chart, Mids::Arc);
-        let start = linear::linear_map(&chart, &boundary, &NoMonitor).expect("maps").raised(&chart, &boundary);
+        let start = linear::linear_map(&chart, &boundary, &NoMonitor).expect("maps").degree_elevated(&chart, &boundary);
         let map = quadratic_map(&chart, &boundary, &NoMonitor).expect("solves");
         assert!(map.energy() < energy(&chart, &start));
         // Moving any node raises the energy: the map is the minimiser.
-        for node in [20, chart.own_vertices() + 100, chart.own_nodes(), chart.node_count() - 1] {
+        for node in [20, chart.chart_vertices() + 100, chart.chart_nodes(), chart.node_count() - 1] {
             let mut moved = map.nodes().to_vec();
             moved[node].x += 1 << 40;
             assert!(energy(&chart, &moved) > map.energy());
@@ -196,7 +160,7 @@ mod tests {
     #[test]
     fn a_flat_round_disk_is_mapped_to_itself() {
         let mesh = repair(&shapes::flat_disk(6), &Default::default()).expect("a surface").mesh;
-        let chart = ClosedChart::new(
+        let chart = FilledChart::new(
             &decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0],
         );
         let boundary = Boundary::circle(&chart, Mids::Chord);

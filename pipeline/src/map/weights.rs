@@ -1,6 +1,6 @@
 //! Edge weights of linear maps: each vertex inside becomes the weighted mean of its neighbours.
 
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use crate::topology::HalfEdgeId;
 
 /// How far a negative weight is raised, relative to the mean value weight of the edge. (Raising to zero is not
@@ -9,7 +9,7 @@ const RAISED_TO: f64 = 0.1;
 
 /// The harmonic weight of every edge: half the sum of the cotangents of the opposite angles (Pinkall and Polthier
 /// 1993, doi 10.1080/10586458.1993.10504266). Negative where these add up to more than pi.
-pub(crate) fn harmonic(chart: &ClosedChart) -> Vec<f64> {
+pub(crate) fn harmonic(chart: &FilledChart) -> Vec<f64> {
     let mut weights = vec![0.0; chart.edges().len()];
     for (f, shape) in chart.shapes().iter().enumerate() {
         for (k, half) in shape.half_cotangents().into_iter().enumerate() {
@@ -21,7 +21,7 @@ pub(crate) fn harmonic(chart: &ClosedChart) -> Vec<f64> {
 
 /// Per edge, its mean value weight as seen from both ends, in the order of the edge's first half-edge (Floater
 /// 2003, doi 10.1016/S0167-8396(02)00002-5): (tan(a/2) + tan(b/2)) / length. Always positive inside.
-pub(crate) fn mean_value(chart: &ClosedChart) -> Vec<[f64; 2]> {
+pub(crate) fn mean_value(chart: &FilledChart) -> Vec<[f64; 2]> {
     let mut weights = vec![[0.0; 2]; chart.edges().len()];
     for (f, shape) in chart.shapes().iter().enumerate() {
         let tangents = shape.half_angle_tangents();
@@ -40,7 +40,7 @@ pub(crate) fn mean_value(chart: &ClosedChart) -> Vec<[f64; 2]> {
 /// The positive weights that replace negative harmonic ones: a tenth of the mean value weight, scaled so that
 /// both kinds of weights have the same sum around a vertex, and averaged over both ends (which keeps the matrix
 /// symmetric; the convex combination theorem asks for positive weights only).
-pub(crate) fn replacements(chart: &ClosedChart, harmonic: &[f64], mean_value: &[[f64; 2]]) -> Vec<f64> {
+pub(crate) fn replacements(chart: &FilledChart, harmonic: &[f64], mean_value: &[[f64; 2]]) -> Vec<f64> {
     let ends = |e: usize| chart.ends(chart.edges().sides(crate::topology::EdgeId::at(e))[0]);
     let mut sums = vec![[0.0_f64; 2]; chart.vertex_count()];
     for e in 0..harmonic.len() {

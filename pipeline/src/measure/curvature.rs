@@ -7,6 +7,7 @@
 //! non-manifold edges measure nothing. All numbers are finite.
 
 use crate::mesh::SurfaceMesh;
+use crate::topology::VertexId;
 use crate::vec3::{Vec3, cross, dot, norm, sub};
 
 /// Curvatures are cut off here, per diagonal of the bounding box: no mesher resolves radii below.
@@ -71,56 +72,95 @@ fn frame(normal: Vec3) -> [Vec3; 2] {
     [[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]]
 }
 
+/// A curvature measure and the area that it belongs to.
+#[derive(Clone, Copy, Default)]
+struct Measure {
+    tensor: Tensor,
+    area: f64,
+}
+
+impl Measure {
+    fn add(&mut self, tensor: Tensor, area: f64) {
+        (0..6).for_each(|k| self.tensor[k] += tensor[k]);
+        self.area += area;
+    }
+}
+
+/// What the triangles around a vertex add up to.
+#[derive(Clone, Copy, Default)]
+struct Star {
+    measure: Measure,
+    /// The sum of normals, weighted by area.
+    normal: Vec3,
+}
+
+impl Star {
+    fn curvature(self) -> Curvature {
+        let Measure { tensor, area } = self.measure;
+        let mean = |x: f64| if area > 0.0 { (x / area).clamp(-LARGEST, LARGEST) } else { 0.0 };
+        Curvature { tensor: tensor.map(mean), normal: self.normal }
+    }
+}
+
+/// The triangles of a surface, in the unit of its metric, by groups of vertices.
+struct Faces<'a> {
+    mesh: &'a SurfaceMesh,
+    group: &'a [u32],
+    points: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    areas: Vec<f64>,
+}
+
+impl<'a> Faces<'a> {
+    fn new(mesh: &'a SurfaceMesh, group: &'a [u32]) -> Self {
+        let scale = mesh.metric().scale;
+        let points: Vec<Vec3> = mesh.points().iter().map(|p| p.map(|c| c * scale)).collect();
+        let normals = mesh.triangles().iter().map(|t| unit_normal(t.map(|v| points[v.index()]))).collect();
+        let areas = mesh.metric().shapes.iter().map(|s| s.area()).collect();
+        Self { mesh, group, points, normals, areas }
+    }
+
+    fn group_of(&self, v: VertexId) -> usize {
+        self.group[v.index()] as usize
+    }
+
+    /// Per group, the measure and the area of its cell: half of each edge, a third of each triangle.
+    fn cells(&self, groups: usize) -> Vec<Measure> {
+        let triangles = self.mesh.triangles();
+        let mut cells = vec![Measure::default(); groups];
+        for (t, area) in triangles.iter().zip(&self.areas) {
+            t.iter().for_each(|v| cells[self.group_of(*v)].area += area / 3.0);
+        }
+        for (_, sides) in self.mesh.edges().iter() {
+            let [g, h] = *sides else { continue };
+            let t = triangles[g.face().index()];
+            let ends = [t[g.side()], t[(g.side() + 1) % 3]];
+            let along = sub(self.points[ends[1].index()], self.points[ends[0].index()]);
+            let [left, right] = [g, h].map(|h| self.normals[h.face().index()]);
+            let half = edge_measure(along, left, right).map(|x| 0.5 * x);
+            ends.iter().for_each(|v| cells[self.group_of(*v)].add(half, 0.0));
+        }
+        cells
+    }
+}
+
 /// The curvature at each group of vertices of `mesh` that `group` gives the same number below `groups`: copies of
 /// one vertex in several sheets share theirs.
 pub fn measure(mesh: &SurfaceMesh, group: &[u32], groups: usize) -> Vec<Curvature> {
-    let scale = mesh.metric().scale;
-    let points: Vec<Vec3> = mesh.points().iter().map(|p| p.map(|c| c * scale)).collect();
-    let corners: Vec<[usize; 3]> = mesh.triangles().iter().map(|t| t.map(|v| group[v.index()] as usize)).collect();
-    let normals: Vec<Vec3> = mesh.triangles().iter().map(|t| unit_normal(t.map(|v| points[v.index()]))).collect();
-    let areas: Vec<f64> = mesh.metric().shapes.iter().map(|s| s.area()).collect();
-    let cells = cells(mesh, &points, &normals, &areas, group, groups);
-    let mut stars = vec![(Tensor::default(), 0.0, Vec3::default()); groups];
-    for (face, t) in corners.iter().enumerate() {
-        let (tensor, area) = t.iter().fold((Tensor::default(), 0.0), |sum, v| plus(sum, cells[*v]));
-        for v in t {
-            let star = &mut stars[*v];
-            (star.0, star.1) = plus((star.0, star.1), (tensor, area));
-            (0..3).for_each(|k| star.2[k] += areas[face] * normals[face][k]);
+    let faces = Faces::new(mesh, group);
+    let cells = faces.cells(groups);
+    let mut stars = vec![Star::default(); groups];
+    for (face, t) in mesh.triangles().iter().enumerate() {
+        let corners = t.map(|v| faces.group_of(v));
+        let mut around = Measure::default();
+        corners.iter().for_each(|c| around.add(cells[*c].tensor, cells[*c].area));
+        for corner in corners {
+            let star = &mut stars[corner];
+            star.measure.add(around.tensor, around.area);
+            (0..3).for_each(|k| star.normal[k] += faces.areas[face] * faces.normals[face][k]);
         }
     }
-    let finished = |(tensor, area, normal): (Tensor, f64, Vec3)| Curvature {
-        tensor: tensor.map(|x| if area > 0.0 { (x / area).clamp(-LARGEST, LARGEST) } else { 0.0 }),
-        normal,
-    };
-    stars.into_iter().map(finished).collect()
-}
-
-/// Per group, the measure and the area of its cell: half of each edge, a third of each triangle.
-fn cells(
-    mesh: &SurfaceMesh,
-    points: &[Vec3],
-    normals: &[Vec3],
-    areas: &[f64],
-    group: &[u32],
-    groups: usize,
-) -> Vec<(Tensor, f64)> {
-    let mut cells = vec![(Tensor::default(), 0.0); groups];
-    for (t, area) in mesh.triangles().iter().zip(areas) {
-        t.iter().for_each(|v| cells[group[v.index()] as usize].1 += area / 3.0);
-    }
-    for (_, sides) in mesh.edges().iter() {
-        let [g, h] = *sides else { continue };
-        let t = mesh.triangles()[g.face().index()];
-        let ends = [t[g.side()], t[(g.side() + 1) % 3]];
-        let along = sub(points[ends[1].index()], points[ends[0].index()]);
-        let half = edge_measure(along, normals[g.face().index()], normals[h.face().index()]).map(|x| 0.5 * x);
-        for v in ends {
-            let cell = &mut cells[group[v.index()] as usize];
-            *cell = plus(*cell, (half, 0.0));
-        }
-    }
-    cells
+    stars.into_iter().map(Star::curvature).collect()
 }
 
 /// b l t t^T for an edge between triangles with the given normals.
@@ -141,13 +181,6 @@ fn unit_normal(p: [Vec3; 3]) -> Vec3 {
     let n = cross(sub(p[1], p[0]), sub(p[2], p[0]));
     let length = norm(n);
     if length > 0.0 { n.map(|c| c / length) } else { [0.0; 3] }
-}
-
-fn plus(a: (Tensor, f64), b: (Tensor, f64)) -> (Tensor, f64) {
-    let mut sum = a;
-    (0..6).for_each(|k| sum.0[k] += b.0[k]);
-    sum.1 += b.1;
-    sum
 }
 
 #[cfg(test)]

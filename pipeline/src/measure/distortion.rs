@@ -4,10 +4,10 @@
 
 use crate::atlas::Chart;
 use crate::certify::CertifiedMap;
-use crate::fem::bernstein::{self, ExactDet};
-use crate::fem::element;
+use crate::fem::bernstein::{self, JacobianBezier};
+use crate::fem::element::{Barycentric, Element, P2};
 use crate::grid::GridPoint;
-use crate::topology::Stars;
+use crate::topology::{Stars, VisitStamps};
 
 /// The fields of one triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,8 +42,8 @@ pub fn fields(chart: &Chart, map: &CertifiedMap) -> Vec<CellFields> {
 
 fn cell_fields(chart: &Chart, map: &CertifiedMap, face: usize) -> CellFields {
     let nodes = map.map().cells[face].map(|n| map.map().nodes[n as usize]);
-    let coefficients = ExactDet::new(nodes).coefficients();
-    let (least, largest) = bernstein::range(coefficients);
+    let coefficients = JacobianBezier::new(nodes).coefficients();
+    let bernstein::Range { min: least, max: largest } = bernstein::range(coefficients);
     let doubled_area = 2.0 * chart.area(face);
     let (det_min, det_max) = (finite(least / doubled_area), finite(largest / doubled_area));
     CellFields {
@@ -70,8 +70,8 @@ fn conformal_distortion(chart: &Chart, face: usize, x: [[f64; 2]; 6]) -> f64 {
     let p = chart.shapes()[face].in_plane();
     let (length, shift, height) = (p[1][0], p[2][0], p[2][1]);
     let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
-    let at = |l: &[f64; 3]| {
-        let g = element::gradients(*l);
+    let at = |l: &Barycentric| {
+        let g = P2::gradients(*l);
         let along = |dir: usize, k: usize| (1..6).map(|n| g[n][dir] * d[n][k]).sum::<f64>();
         let (a, b) = ([along(0, 0), along(0, 1)], [along(1, 0), along(1, 1)]);
         let det = (a[0] * b[1] - a[1] * b[0]) / (length * height);
@@ -79,10 +79,8 @@ fn conformal_distortion(chart: &Chart, face: usize, x: [[f64; 2]; 6]) -> f64 {
         let second = [0, 1].map(|k| (b[k] - shift * first[k]) / height);
         singular_ratio(first, second, det)
     };
-    let largest = element::NODES
-        .iter()
-        .map(at)
-        .fold(1.0, |m, r| if r.is_finite() && r > 0.0 { f64::max(m, r) } else { f64::MAX });
+    let largest =
+        P2::NODES.iter().map(at).fold(1.0, |m, r| if r.is_finite() && r > 0.0 { f64::max(m, r) } else { f64::MAX });
     largest.clamp(1.0, f64::MAX)
 }
 
@@ -95,10 +93,10 @@ pub(crate) fn singular_ratio(first: [f64; 2], second: [f64; 2], det: f64) -> f64
 }
 
 /// Sums up the fields of a chart. Triangles whose shape mollification changed by more than 1 % are left out of the
-/// conformal quantiles (unless all are).
-pub fn summary(chart: &Chart, map: &CertifiedMap, fields: &[CellFields]) -> Summary {
+/// conformal quantiles (unless all are). `area_ratio` is that of the chart (see [`area_ratio()`]).
+pub fn summary(chart: &Chart, fields: &[CellFields], area_ratio: f64) -> Summary {
     let [conformal_median, conformal_p99] = conformal_quantiles(chart, |f| fields[f].conformal_distortion, [0.5, 0.99]);
-    Summary { conformal_median, conformal_p99, area_ratio: area_ratio(chart, map) }
+    Summary { conformal_median, conformal_p99, area_ratio }
 }
 
 /// The conformal distortion that 99 % of the area does not exceed, of a map that may be invalid here and there, by the
@@ -122,13 +120,15 @@ fn conformal_quantiles<const N: usize>(chart: &Chart, distortion: impl Fn(usize)
 fn star_scales(chart: &Chart, plane: &[f64]) -> Vec<(f64, f64)> {
     let stars = Stars::new(chart.triangles(), chart.vertices().len());
     let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
-    let (mut seen, mut seen_corner) = (vec![u32::MAX; space.len()], vec![u32::MAX; chart.vertices().len()]);
+    let mut seen_faces = VisitStamps::new(space.len());
+    let mut seen_corners = VisitStamps::new(chart.vertices().len());
     let mut two_rings = |v: usize| {
-        let new = |seen: &mut u32| std::mem::replace(seen, v as u32) != v as u32;
+        seen_faces.clear();
+        seen_corners.clear();
         let (mut in_plane, mut in_space) = (0.0, 0.0);
         let ring = stars.around(v).iter().flat_map(|f| chart.triangles()[*f as usize]);
-        for u in ring.filter(|u| new(&mut seen_corner[u.index()])) {
-            for f in stars.around(u.index()).iter().map(|f| *f as usize).filter(|f| new(&mut seen[*f])) {
+        for u in ring.filter(|u| seen_corners.visit(u.index())) {
+            for f in stars.around(u.index()).iter().map(|f| *f as usize).filter(|f| seen_faces.visit(*f)) {
                 in_plane += plane[f];
                 in_space += space[f];
             }
@@ -154,7 +154,7 @@ pub fn area_ratio(chart: &Chart, map: &CertifiedMap) -> f64 {
 /// The area ratio of a map that may be invalid here and there, by the nodes of each triangle of the chart: stars whose
 /// area is not positive do not count.
 pub(crate) fn area_ratio_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [GridPoint; 6]) -> f64 {
-    let area = |f: usize| area_in_plane(&ExactDet::new(nodes(f)).coefficients());
+    let area = |f: usize| area_in_plane(&JacobianBezier::new(nodes(f)).coefficients());
     let plane: Vec<f64> = (0..chart.triangles().len()).map(area).collect();
     let mut scales = star_scales(chart, &plane);
     scales.retain(|s| s.0 > 0.0);
@@ -169,7 +169,7 @@ fn ratio(mut scales: Vec<(f64, f64)>) -> f64 {
 /// Per triangle of a map its area in the plane.
 fn plane_areas(map: &CertifiedMap) -> Vec<f64> {
     let place = |n: u32| map.map().nodes[n as usize];
-    map.map().cells.iter().map(|c| area_in_plane(&ExactDet::new(c.map(place)).coefficients())).collect()
+    map.map().cells.iter().map(|c| area_in_plane(&JacobianBezier::new(c.map(place)).coefficients())).collect()
 }
 
 /// The values at the given shares of the total weight.
@@ -189,7 +189,8 @@ pub(crate) fn quantiles<const N: usize>(weighted: &mut [(f64, f64)], shares: [f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Order, decompose, finish_chart, map_chart, repair, shapes};
+    use crate::parametrize::parametrize_chart;
+    use crate::{Order, decompose, repair, shapes};
 
     #[test]
     fn quantiles_follow_the_weights() {
@@ -204,16 +205,15 @@ mod tests {
             let soup = crate::mesh::TriangleSoup::new(points, soup.triangles().to_vec()).expect("sound");
             let mesh = repair(&soup, &Default::default()).expect("a surface").mesh;
             let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart");
-            let chart = &atlas.charts()[0];
-            let done = finish_chart(map_chart(chart, Order::Quadratic).expect("maps"));
-            let fields = fields(chart, &done.certified);
-            for f in &fields {
+            let chart = atlas.into_charts().remove(0);
+            let done = parametrize_chart(chart, Order::Quadratic).expect("maps");
+            for f in done.fields() {
                 assert!(f.det_min > 0.0 && f.det_min <= f.det_max && f.det_max.is_finite(), "{f:?}");
                 assert!(f.jacobian_ratio > 0.0 && f.jacobian_ratio <= 1.0);
                 assert!(f.conformal_distortion >= 1.0 && f.conformal_distortion.is_finite());
                 assert!(f.area_scale > 0.0 && f.area_scale.is_finite());
             }
-            let s = summary(chart, &done.certified, &fields);
+            let s = done.distortion();
             assert!(s.conformal_median <= s.conformal_p99 && s.area_ratio >= 1.0 && s.area_ratio.is_finite());
         }
     }

@@ -17,7 +17,7 @@ use crate::atlas::Chart;
 use crate::evaluate::on_segment;
 use crate::measure::curvature::Principal;
 use crate::mesh::SurfaceMesh;
-use crate::topology::{FaceId, HalfEdgeId};
+use crate::topology::{FaceId, HalfEdgeId, VisitStamps};
 use crate::vec3::{Vec3, cross, distance, dot, norm, sub, triangle_area};
 use std::f64::consts::{PI, TAU};
 
@@ -56,7 +56,7 @@ pub struct Spike {
 
 /// The spikes and pits inside `charts` that a mesh with edges of length `size` would cut off, from the widest to the
 /// thinnest. `curvatures` are those of the vertices of `mesh`, more may follow.
-pub fn spikes(mesh: &SurfaceMesh, charts: &[Chart], curvatures: &[Principal], size: f64) -> Vec<Spike> {
+pub fn spikes<C: AsRef<Chart>>(mesh: &SurfaceMesh, charts: &[C], curvatures: &[Principal], size: f64) -> Vec<Spike> {
     let mut search = Search::new(mesh, charts);
     let bends: Vec<f64> = angles(mesh)
         .iter()
@@ -114,9 +114,8 @@ struct Search<'a> {
     chart: Vec<u32>,
     /// Per vertex a triangle beside it.
     beside: Vec<u32>,
-    /// Per triangle, the walk that saw it last.
-    seen: Vec<u32>,
-    walk: u32,
+    /// The triangles that the walk has reached.
+    seen: VisitStamps,
     /// The triangles of a walk, in the order in which they were reached.
     queue: Vec<u32>,
     /// Per vertex, whether it lies in the ball around a thin place.
@@ -124,17 +123,17 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(mesh: &'a SurfaceMesh, charts: &[Chart]) -> Self {
+    fn new<C: AsRef<Chart>>(mesh: &'a SurfaceMesh, charts: &[C]) -> Self {
         let mut chart = vec![u32::MAX; mesh.triangles().len()];
         for (c, id) in charts.iter().zip(0..) {
-            c.faces().iter().for_each(|f| chart[f.index()] = id);
+            c.as_ref().faces().iter().for_each(|f| chart[f.index()] = id);
         }
         let mut beside = vec![u32::MAX; mesh.points().len()];
         for (t, face) in mesh.triangles().iter().zip(0..) {
             t.iter().for_each(|v| beside[v.index()] = face);
         }
-        let (seen, within) = (vec![0; chart.len()], vec![false; beside.len()]);
-        Self { mesh, chart, beside, seen, walk: 0, queue: Vec::new(), within }
+        let (seen, within) = (VisitStamps::new(chart.len()), vec![false; beside.len()]);
+        Self { mesh, chart, beside, seen, queue: Vec::new(), within }
     }
 
     /// Those of `vertices` around which the surface is thin. Of several within half of `radius`, the first.
@@ -167,7 +166,7 @@ impl<'a> Search<'a> {
         let centre = self.mesh.points()[vertex];
         let disk = PI * radius * radius;
         let mut area = 0.0;
-        self.walk += 1;
+        self.seen.clear();
         self.queue.clear();
         self.reach(self.beside[vertex]);
         let mut next = 0;
@@ -189,8 +188,7 @@ impl<'a> Search<'a> {
     }
 
     fn reach(&mut self, face: u32) {
-        if self.seen[face as usize] != self.walk {
-            self.seen[face as usize] = self.walk;
+        if self.seen.visit(face as usize) {
             self.queue.push(face);
         }
     }

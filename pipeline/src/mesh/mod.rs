@@ -10,4 +10,5 @@ pub use intrinsic::{Metric, TriangleShape};
 pub use outlier::ValueApart;
 pub use soup::{SoupError, TriangleSoup};
 pub use steps::{CoordinateSteps, FEW_STEPS};
+pub(crate) use surface::Patch;
 pub use surface::SurfaceMesh;

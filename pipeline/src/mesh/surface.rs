@@ -1,10 +1,12 @@
 //! A repaired surface.
 
 use super::Metric;
-use crate::atlas::Chart;
-use crate::topology::VertexId;
-use crate::topology::{Census, EdgeTable};
+use crate::topology::{Census, EdgeTable, FaceId, VertexId};
 use crate::vec3::{BoundingBox, Vec3, triangle_area};
+
+/// A mesh gets at least this many edges along the diagonal of the bounding box, unless another size is asked for: CAD parts
+/// of a dozen facets would keep theirs otherwise.
+const EDGES_PER_DIAGONAL: f64 = 50.0;
 
 /// A triangulated surface after repair: no triangle repeats a vertex or another triangle, orientable components
 /// are oriented, and every sheet that met others at non-manifold edges or vertices has vertices of its own. Made by
@@ -20,6 +22,21 @@ pub struct SurfaceMesh {
     pub(crate) edges: EdgeTable,
     pub(crate) census: Census,
     pub(crate) metric: Metric,
+}
+
+/// What is known of a part of a surface beside its connectivity and its lengths.
+#[derive(Clone, Debug)]
+pub(crate) struct Patch {
+    /// Per vertex, its position.
+    pub points: Vec<Vec3>,
+    /// Per vertex, the welded vertex that it is a copy of.
+    pub welded: Vec<u32>,
+    /// Per triangle, its position in the input.
+    pub source: Vec<u32>,
+    /// Vertices from this one on are not of the input.
+    pub added_from: usize,
+    /// What mollification added to the lengths of the surface.
+    pub mollified_by: f64,
 }
 
 impl SurfaceMesh {
@@ -70,26 +87,40 @@ impl SurfaceMesh {
         self.triangles[face].map(|v| self.points[v.index()])
     }
 
-    /// The part of the surface that a chart covers, as a surface of its own: vertices and triangles are numbered as in
-    /// the chart.
-    pub(crate) fn part(&self, chart: &Chart) -> Self {
-        let vertex = |v: &VertexId| v.index();
-        let (triangles, edges) = (chart.triangles().to_vec(), chart.edges().clone());
-        Self {
-            points: chart.vertices().iter().map(|v| self.points[vertex(v)]).collect(),
-            welded: chart.vertices().iter().map(|v| self.welded[vertex(v)]).collect(),
-            source: chart.faces().iter().map(|f| self.source[f.index()]).collect(),
-            added_from: chart.vertices().partition_point(|v| v.index() < self.added_from),
-            census: Census::new(&triangles, &edges),
-            metric: Metric {
-                shapes: chart.shapes().to_vec(),
-                flagged: chart.flagged().to_vec(),
-                mollified_by: self.metric.mollified_by,
-                scale: self.metric.scale,
-            },
-            triangles,
-            edges,
+    /// The part with these vertices and faces, both ascending.
+    pub(crate) fn patch(&self, vertices: &[VertexId], faces: &[FaceId]) -> Patch {
+        Patch {
+            points: vertices.iter().map(|v| self.points[v.index()]).collect(),
+            welded: vertices.iter().map(|v| self.welded[v.index()]).collect(),
+            source: faces.iter().map(|f| self.source[f.index()]).collect(),
+            added_from: vertices.partition_point(|v| v.index() < self.added_from),
+            mollified_by: self.metric.mollified_by,
         }
+    }
+
+    /// The surface of some faces, ascending, which hold all triangles around each of their edges.
+    pub(crate) fn restricted(&self, faces: &[FaceId]) -> Self {
+        let mut is_used = vec![false; self.points.len()];
+        faces.iter().flat_map(|f| self.triangles[f.index()]).for_each(|v| is_used[v.index()] = true);
+        let vertices: Vec<VertexId> = (0..is_used.len()).filter(|v| is_used[*v]).map(VertexId::at).collect();
+        let mut number = vec![VertexId(u32::MAX); self.points.len()];
+        vertices.iter().zip(0..).for_each(|(v, n)| number[v.index()] = VertexId(n));
+        let triangles = faces.iter().map(|f| self.triangles[f.index()].map(|v| number[v.index()])).collect();
+        let local = |f: FaceId| faces.binary_search(&f).ok().map(FaceId::at);
+        let metric = Metric {
+            shapes: faces.iter().map(|f| self.metric.shapes[f.index()]).collect(),
+            flagged: faces.iter().map(|f| self.metric.flagged[f.index()]).collect(),
+            mollified_by: self.metric.mollified_by,
+            scale: self.metric.scale,
+        };
+        Self::of_patch(triangles, self.edges.part(faces, local), metric, self.patch(&vertices, faces))
+    }
+
+    /// A part as a surface of its own.
+    pub(crate) fn of_patch(triangles: Vec<[VertexId; 3]>, edges: EdgeTable, metric: Metric, patch: Patch) -> Self {
+        let Patch { points, welded, source, added_from, .. } = patch;
+        let census = Census::new(&triangles, &edges);
+        Self { points, triangles, source, welded, added_from, edges, census, metric }
     }
 
     /// The total true area, in the unit of the input, squared.
@@ -98,6 +129,15 @@ impl SurfaceMesh {
         let scale = self.metric.scale;
         let scaled = |f: usize| triangle_area(self.corners(f).map(|p| p.map(|c| c * scale)));
         (0..self.triangles.len()).map(scaled).sum::<f64>() / scale / scale
+    }
+
+    /// The length of edges of a mesh like this one, in the unit of the input: that of as many equilateral triangles of the
+    /// same area, but at most a fiftieth of the diagonal of the bounding box.
+    pub fn default_size(&self) -> f64 {
+        let coarsest = self.bounding_box().diagonal() / EDGES_PER_DIAGONAL;
+        let share = self.area() / self.triangles.len() as f64;
+        let edge = (share * 4.0 / 3.0_f64.sqrt()).sqrt();
+        if edge > 0.0 { edge.min(coarsest) } else { coarsest }
     }
 
     /// The smallest box around the surface.

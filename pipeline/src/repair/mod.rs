@@ -12,10 +12,11 @@
 //! Everything that was found and done is counted, with the first few ids. The census of the result still counts
 //! the non-manifold edges that were split, and the vertices at which a sheet touches others away from its
 //! boundary: both have to become seams. What cannot be a surface at all (no triangle is left) is refused, and what nobody
-//! wants charts of ([`Repaired::check_sheets`]).
+//! wants charts of ([`Repaired::accepted`]).
 
 mod cracks;
 mod near;
+mod sheets;
 mod t_junctions;
 pub(crate) mod weld;
 
@@ -23,6 +24,8 @@ use crate::mesh::{Metric, SurfaceMesh, TriangleSoup};
 use crate::topology::{Census, EdgeTable, Umbrellas};
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 use crate::vec3::{BoundingBox, Vec3, midpoint, unit_scale};
+pub use sheets::{Accepted, RefusedComponent};
+use sheets::{MAX_SHEETS, MAX_TINY_SHEETS, TINY_SHEET};
 use t_junctions::Boundary;
 
 /// What repair may do.
@@ -135,34 +138,6 @@ pub enum Error {
         /// The first vertices (after welding) at which sheets meet.
         vertices: Vec<u32>,
     },
-}
-
-/// Sheets that non-manifold edges may cut a surface into. Each is a chart at least: the 6480 of the faces of all tetrahedra
-/// in a grid of 8 x 8 x 8 cubes take 8 seconds, and the cost grows with the square of their number.
-const MAX_SHEETS: usize = 10_000;
-
-/// The same, for sheets of fewer than [`TINY_SHEET`] triangles on average: faces of volume elements have one or two, and
-/// an atlas of them is of no use. A network of faults or a foam has more.
-const MAX_TINY_SHEETS: usize = 1_000;
-
-/// See [`MAX_TINY_SHEETS`].
-const TINY_SHEET: usize = 4;
-
-impl Repaired {
-    /// Checks that what was repaired is worth an atlas.
-    ///
-    /// # Errors
-    /// [`Error::VolumeElements`].
-    pub fn check_sheets(&self) -> Result<(), Error> {
-        let census = self.mesh.census();
-        let (sheets, triangles) = (census.components.saturating_sub(self.raw.components), census.triangles);
-        let is_tiny = triangles < TINY_SHEET * sheets;
-        if sheets <= if is_tiny { MAX_TINY_SHEETS } else { MAX_SHEETS } {
-            return Ok(());
-        }
-        let vertices = self.report.split_vertices.first.clone();
-        Err(Error::VolumeElements { sheets, triangles, nonmanifold_edges: census.nonmanifold_edges, vertices })
-    }
 }
 
 /// Triangles on their way through repair: each with its position in the input.

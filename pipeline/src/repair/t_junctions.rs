@@ -24,7 +24,7 @@ use super::cracks::FACING;
 use super::near::PointTree;
 use super::open_half_edges;
 use crate::topology::EdgeTable;
-use crate::topology::csr::Buckets;
+use crate::topology::csr::Csr;
 use crate::topology::{HalfEdgeId, VertexId};
 use crate::vec3::{Vec3, cross, dot, norm, sub};
 
@@ -194,9 +194,9 @@ impl<'a> Boundary<'a> {
     }
 
     /// Per vertex the numbers of the boundary edges at it.
-    fn edges_at_vertices(&self) -> Buckets<u32> {
+    fn edges_at_vertices(&self) -> Csr<u32> {
         let at_ends = || self.open.iter().flat_map(|h| self.ends(*h).map(|v| (v.0, h.0)));
-        Buckets::new(self.points.len(), at_ends)
+        Csr::sorted(self.points.len(), at_ends)
     }
 
     /// The boundary edges that run along the edge `h`, out of those at the vertices on it; and for each of these vertices
@@ -206,13 +206,13 @@ impl<'a> Boundary<'a> {
         h: HalfEdgeId,
         line: &Line,
         on_edge: &[OnEdge],
-        edges_at: &mut Buckets<u32>,
+        edges_at: &mut Csr<u32>,
         looks: &mut usize,
     ) -> (Vec<Beside>, Vec<bool>) {
         let inward = self.inward(h);
         let (mut beside, mut runs_along) = (Vec::new(), Vec::new());
         for v in on_edge {
-            let edges = edges_at.get_mut(v.vertex.index());
+            let edges = edges_at.row_mut(v.vertex.index());
             *looks = looks.saturating_sub(edges.len());
             let affordable = if *looks == 0 { &mut [] } else { edges };
             let found: Vec<Beside> =

@@ -349,15 +349,51 @@ fn faces_of_tetrahedra(n: u32) -> TriangleSoup {
 
 #[test]
 fn faces_of_volume_elements_are_refused_and_a_few_sheets_are_not() {
-    let refused = repaired(&faces_of_tetrahedra(16)).check_sheets();
+    let refused = repaired(&faces_of_tetrahedra(16)).accepted();
     let Err(Error::VolumeElements { sheets, triangles, nonmanifold_edges, vertices }) = refused else {
         panic!("{refused:?}")
     };
     assert_eq!((triangles, nonmanifold_edges, vertices.len()), (50_688, 30_928, 8));
     assert!(sheets > 50_000);
     for few in [faces_of_tetrahedra(3), shapes::book(40, 20), shapes::sphere(8)] {
-        assert_eq!(repaired(&few).check_sheets(), Ok(()));
+        let all = few.triangles().len();
+        let accepted = repaired(&few).accepted().expect("few sheets");
+        assert!(accepted.refused.is_empty() && accepted.mesh.triangles().len() >= all);
     }
+}
+
+/// Several soups beside each other, each moved along x.
+fn side_by_side(soups: &[TriangleSoup]) -> TriangleSoup {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for (soup, shift) in soups.iter().zip(0_u32..) {
+        let first = points.len() as u32;
+        points.extend(soup.points().iter().map(|[x, y, z]| [x + 100.0 * f64::from(shift), *y, *z]));
+        triangles.extend(soup.triangles().iter().map(|t| t.map(|v| v + first)));
+    }
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn components_of_volume_elements_are_refused_alone() {
+    let (sphere, volume, book) = (shapes::sphere(8), faces_of_tetrahedra(8), shapes::book(3, 4));
+    let [of_sphere, of_volume] = [&sphere, &volume].map(|s| s.triangles().len());
+    let mixed = repaired(&side_by_side(&[sphere, volume, book.clone()]));
+    let census = mixed.mesh.census().clone();
+    let Accepted { mesh, refused } = mixed.accepted().expect("a sphere and a book");
+    let [RefusedComponent { component: 1, triangles, first_triangle, error }] = &refused[..] else {
+        panic!("{refused:?}")
+    };
+    assert_eq!((*triangles, *first_triangle as usize), (of_volume, of_sphere));
+    let Error::VolumeElements { sheets, nonmanifold_edges, vertices, .. } = error else { panic!("{error}") };
+    assert!(*sheets > 1_000 && vertices.len() == 8, "{error}");
+    let of_book = repaired(&book).mesh.census().clone();
+    assert_eq!(nonmanifold_edges + of_book.nonmanifold_edges, census.nonmanifold_edges);
+    // What is left is what it was.
+    assert_eq!(mesh.census().components, 1 + of_book.components);
+    assert_eq!(mesh.triangles().len(), of_sphere + of_book.triangles);
+    let last = mesh.triangles().len() - 1;
+    assert_eq!(mesh.source_triangle(last) as usize, of_sphere + of_volume + of_book.triangles - 1);
+    assert!(mesh.corners(last).iter().all(|p| p[0] > 150.0), "{:?}", mesh.corners(last));
 }
 
 #[test]

@@ -18,7 +18,7 @@ const SCALES: [usize; 3] = [1, 2, 4];
 
 /// Marks the vertices as corners in which edges of the shape turn sharply, the sharpest first, if there is no corner within
 /// `spacing` along the curve yet. `corner` tells the others.
-pub(super) fn mark(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, spacing: f64, corner: &mut [bool]) {
+pub(super) fn mark(mesh: &SurfaceMesh, charts: &[&Chart], boundary: &Boundary, spacing: f64, corner: &mut [bool]) {
     let chains = Chains::new(mesh, boundary, corner);
     let is_shape: Vec<bool> = (0..boundary.by_segment.len()).map(|s| is_shape(mesh, charts, boundary, s)).collect();
     let of_shape = |v: &usize| chains.is_inner(*v) && chains.segments[*v].iter().all(|s| is_shape[*s as usize]);
@@ -40,8 +40,8 @@ pub(super) fn mark(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, sp
 }
 
 /// Whether a segment is an edge of the shape: open boundary, an edge of several sheets, or a sharp edge between two charts.
-fn is_shape(mesh: &SurfaceMesh, charts: &[Chart], boundary: &Boundary, segment: usize) -> bool {
-    let steps: Vec<_> = boundary.by_segment[segment].iter().map(|s| boundary.steps[*s as usize]).collect();
+fn is_shape(mesh: &SurfaceMesh, charts: &[&Chart], boundary: &Boundary, segment: usize) -> bool {
+    let steps: Vec<_> = boundary.by_segment.row(segment).iter().map(|s| boundary.steps[*s as usize]).collect();
     let [a, b] = steps[..] else { return true };
     let normal = |step: &super::Step| {
         let face = charts[step.chart.index()].faces()[step.half_edge.face().index()];
@@ -72,7 +72,7 @@ impl Chains {
         let mut segments = vec![[NONE; 2]; corner.len()];
         let mut places = vec![[0.0; 3]; corner.len()];
         let mut ends = Vec::with_capacity(boundary.by_segment.len());
-        for (segment, steps) in (0..).zip(&boundary.by_segment) {
+        for (segment, steps) in (0..).zip(boundary.by_segment.rows()) {
             let step = boundary.steps[steps[0] as usize];
             ends.push([step.from, step.to]);
             for (welded, vertex) in [step.from, step.to].into_iter().zip(step.ends) {

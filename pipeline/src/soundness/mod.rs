@@ -29,7 +29,7 @@ pub use reference::{HandedOverAtlas, HandedOverChart, Mesh, Triangulation};
 pub use topology::Invariants;
 
 use crate::topology::EdgeTable;
-use crate::topology::csr::Buckets;
+use crate::topology::csr::Csr;
 use crate::topology::{ChartId, CurveId, VertexId};
 use crate::vec3::Vec3;
 use covering::InPlane;
@@ -436,9 +436,9 @@ fn degenerate(mesh: &Triangulation) -> Option<Defect> {
     let all = || mesh.triangles.iter().map(sorted).zip(0_u32..).map(|([a, b, c], t)| (a, ([b, c], t)));
     let named_twice = all().filter(|(a, ([b, c], _))| a == b || b == c).map(|(_, (_, t))| t);
     let mut bad: Vec<u32> = named_twice.collect();
-    let mut by_least = Buckets::new(mesh.points.len(), all);
+    let mut by_least = Csr::sorted(mesh.points.len(), all);
     for node in 0..mesh.points.len() {
-        let around = by_least.get_mut(node);
+        let around = by_least.row_mut(node);
         around.sort_unstable();
         bad.extend(around.chunk_by(|a, b| a.0 == b.0).flat_map(|same| &same[1..]).map(|copy| copy.1));
     }

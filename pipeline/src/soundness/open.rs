@@ -1,6 +1,6 @@
 //! The sides that only one triangle has.
 
-use crate::topology::csr::Buckets;
+use crate::topology::csr::Csr;
 
 /// A side by its lower node: the group of the triangle, the upper node, and whether the side runs upward.
 type Side = (u32, (u32, u32, bool));
@@ -11,10 +11,10 @@ pub fn sides_of_one<I>(nodes: usize, groups: usize, triangles: impl Fn() -> I) -
 where
     I: Iterator<Item = (u32, [u32; 3])>,
 {
-    let mut by_lower = Buckets::new(nodes, || triangles().flat_map(sides));
+    let mut by_lower = Csr::sorted(nodes, || triangles().flat_map(sides));
     let mut open = vec![Vec::new(); groups];
     for lower in 0..nodes as u32 {
-        let around = by_lower.get_mut(lower as usize);
+        let around = by_lower.row_mut(lower as usize);
         around.sort_unstable();
         for side in around.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).filter(|same| same.len() == 1) {
             let (group, upper, is_upward) = side[0];

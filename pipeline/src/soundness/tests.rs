@@ -1,9 +1,10 @@
 use super::*;
-use crate::seams::SeamNetwork;
+use crate::atlas::CertifiedAtlas;
+use crate::parametrize::parametrize_chart;
 use crate::seams::tests::{labelled, sector};
 use crate::subdivide::subdivide;
 use crate::topology::VertexId;
-use crate::{Order, finish_chart, map_chart, shapes};
+use crate::{Order, shapes};
 
 /// A surface with its atlas as a mesher gets it, and the best of all meshes: the surface itself.
 struct Sample {
@@ -17,10 +18,11 @@ struct Sample {
 impl Sample {
     fn new(soup: &crate::mesh::TriangleSoup, label: impl Fn(Vec3) -> u32) -> Self {
         let (mesh, atlas) = labelled(soup, label);
-        let maps: Vec<_> =
-            atlas.charts().iter().map(|c| finish_chart(map_chart(c, Order::Quadratic).expect("maps"))).collect();
-        let network = SeamNetwork::new(&mesh, atlas.charts(), 0.0);
-        let linear = subdivide(&mesh, atlas.charts(), &maps, &vec![None; maps.len()], &network).expect("subdivides");
+        let certified = |chart| parametrize_chart(chart, Order::Quadratic).expect("maps");
+        let charts = atlas.into_charts().into_iter().map(certified).collect();
+        let atlas = CertifiedAtlas::gather(mesh, charts, Some(f64::MIN_POSITIVE)).expect("an atlas");
+        let (mesh, network) = (atlas.mesh(), atlas.seams());
+        let linear = subdivide(&atlas, &vec![None; atlas.charts().len()]).expect("subdivides");
         let point = |n: &u32| linear.points()[*n as usize];
         let charts = linear.charts().iter().enumerate().map(|(c, l)| {
             let passages = network.loops(ChartId::at(c)).concat();
@@ -36,7 +38,7 @@ impl Sample {
         };
         let mut charts = vec![0; mesh.triangles().len()];
         for c in atlas.charts() {
-            c.faces().iter().for_each(|f| charts[f.index()] = c.id().0);
+            c.chart().faces().iter().for_each(|f| charts[f.index()] = c.id().0);
         }
         let triangles = mesh.triangles().iter().map(|t| t.map(|v| v.0));
         let surface = Triangulation::welded(mesh.points(), triangles);

@@ -22,8 +22,7 @@ mod nodes;
 mod normals;
 mod refine;
 
-use crate::CertifiedChart;
-use crate::atlas::Chart;
+use crate::atlas::{CertifiedAtlas, Chart};
 use crate::certify::{CertifiedMap, PlanarMap, StraightMap, parts, polygons, prove};
 use crate::grid::{GridPoint, orientation};
 use crate::measure::curvature::Principal;
@@ -172,25 +171,19 @@ impl LinearChart {
     }
 }
 
-/// Turns `maps`, those of `charts`, in order, into linear triangulations. Charts with a map in `straight` are handed over by
-/// that one, if it can be.
+/// Turns the maps of an atlas into linear triangulations. Charts with a map in `straight` are handed over by that one, if it
+/// can be.
 ///
 /// # Errors
 /// [`Error`]: this surface cannot be handed over in this form; the maps are none the worse.
 ///
 /// # Panics
-/// If `maps`, `straight` and `network` are not those of `charts`.
-pub fn subdivide(
-    mesh: &SurfaceMesh,
-    charts: &[Chart],
-    maps: &[CertifiedChart],
-    straight: &[Option<&StraightMap>],
-    network: &SeamNetwork,
-) -> Result<LinearAtlas, Error> {
-    assert_eq!([maps.len(), straight.len()], [charts.len(); 2], "maps for every chart");
-    refuse_self_contact(network, charts.len())?;
-    let split = split(mesh, charts, maps, straight, network)?;
-    let Split { nodes, charts, by, refined } = split;
+/// If `straight` has not one entry for every chart, or a map of another chart.
+pub fn subdivide(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<LinearAtlas, Error> {
+    let mesh = atlas.mesh();
+    assert_eq!(straight.len(), atlas.charts().len(), "an entry for every chart");
+    refuse_self_contact(atlas.seams(), atlas.charts().len())?;
+    let Split { nodes, charts, by, refined } = split(atlas, straight)?;
     let those = |which: &dyn Fn(HandedOver) -> bool| {
         (0..by.len()).filter(|c| which(by[*c])).map(ChartId::at).collect::<Vec<ChartId>>()
     };
@@ -198,7 +191,7 @@ pub fn subdivide(
     let linear = those(&|by| matches!(by, HandedOver::Start | HandedOver::Chords));
     let mut points = nodes.positions(mesh);
     let moved = normals::separate(&mut points, &charts, mesh.bounding_box().diagonal())?;
-    let curves = network.curves().iter().map(|c| nodes.along(c)).collect();
+    let curves = atlas.seams().curves().iter().map(|c| nodes.along(c)).collect();
     Ok(LinearAtlas { curvatures: nodes.curvatures(mesh), points, charts, curves, straight, linear, refined, moved })
 }
 
@@ -240,25 +233,20 @@ impl Proven<'_> {
 
 /// Splits the triangles of all charts. A chart that needs too many parts gets a plainer map, and all begins again: at
 /// most three times for each chart.
-fn split(
-    mesh: &SurfaceMesh,
-    charts: &[Chart],
-    maps: &[CertifiedChart],
-    straight: &[Option<&StraightMap>],
-    network: &SeamNetwork,
-) -> Result<Split, Error> {
-    let certified = |c: usize| Proven::Quadratic(Cow::Borrowed(&maps[c].certified));
+fn split(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<Split, Error> {
+    let (mesh, charts, network) = (atlas.mesh(), atlas.charts(), atlas.seams());
+    let certified = |c: usize| Proven::Quadratic(Cow::Borrowed(charts[c].map()));
     let first = |c: usize| match straight[c] {
         Some(map) => (HandedOver::Straight, Proven::Straight(map)),
         None => (HandedOver::Certified, certified(c)),
     };
     let (mut by, mut chosen): (Vec<HandedOver>, Vec<Proven>) = (0..charts.len()).map(first).unzip();
     loop {
-        let mut nodes = Nodes::new(mesh, network, charts);
+        let mut nodes = Nodes::new(atlas);
         let current: Vec<&PlanarMap> = chosen.iter().map(Proven::map).collect();
         let mut split: Vec<LinearChart> =
-            charts.iter().zip(&current).map(|(c, m)| quartered(mesh, c, m, &nodes)).collect();
-        let failed = match refine::refine(refine::DEPTH, mesh, charts, &current, &mut nodes, &mut split) {
+            charts.iter().zip(&current).map(|(c, m)| quartered(mesh, c.chart(), m, &nodes)).collect();
+        let failed = match refine::refine(refine::DEPTH, atlas, &current, &mut nodes, &mut split) {
             Ok(refined) => {
                 let is_straight = |c: &usize| by[*c] == HandedOver::Straight;
                 let touches = |c: &usize| touches_itself(&split[*c], ChartId::at(*c), network, &nodes);
@@ -274,7 +262,7 @@ fn split(
             Err(failed) => failed,
         };
         for (chart, inverted) in blamed(failed, &by, network, &nodes)? {
-            let start = &maps[chart].start;
+            let start = charts[chart].start();
             (by[chart], chosen[chart]) = match by[chart] {
                 HandedOver::Straight => (HandedOver::Certified, certified(chart)),
                 HandedOver::Certified => (HandedOver::Start, Proven::Quadratic(Cow::Borrowed(start))),

@@ -1,10 +1,10 @@
 //! The nodes that the charts of a surface share: vertices, middles of edges, and middles of parts of these.
 
-use crate::atlas::Chart;
+use crate::atlas::{CertifiedAtlas, Chart};
 use crate::measure::curvature::{self, Principal};
 use crate::mesh::SurfaceMesh;
-use crate::seams::{Curve, SeamNetwork};
-use crate::topology::{EdgeId, FaceId, HalfEdgeId, VertexId};
+use crate::seams::Curve;
+use crate::topology::{EdgeId, HalfEdgeId, VertexId};
 use crate::vec3::{Vec3, midpoint};
 use std::collections::BTreeMap;
 
@@ -29,13 +29,15 @@ pub(super) fn on_surface(chart: &Chart, h: HalfEdgeId) -> HalfEdgeId {
 }
 
 impl Nodes {
-    pub(super) fn new(mesh: &SurfaceMesh, network: &SeamNetwork, charts: &[Chart]) -> Self {
+    pub(super) fn new(atlas: &CertifiedAtlas) -> Self {
+        let mesh = atlas.mesh();
         let vertex = first_copies(mesh);
         let mut edge: Vec<u32> = (0..mesh.edges().len() as u32).collect();
         let mut curve_edges = Vec::new();
-        for curve in network.curves() {
+        for curve in atlas.seams().curves() {
             let beside = |i: usize| {
-                let side = |s: &crate::seams::CurveSide| on_surface(&charts[s.chart.index()], s.half_edges[i]);
+                let side =
+                    |s: &crate::seams::CurveSide| on_surface(atlas.charts()[s.chart.index()].chart(), s.half_edges[i]);
                 curve.sides().iter().map(|s| mesh.edges().edge(side(s)).0).collect::<Vec<u32>>()
             };
             let mut along = Vec::with_capacity(curve.segments());
@@ -67,9 +69,6 @@ impl Nodes {
 
     /// The nodes of a chart: its vertices, then the middles of its edges.
     pub(super) fn of_chart(&self, mesh: &SurfaceMesh, chart: &Chart) -> Vec<u32> {
-        let same =
-            |(f, t): (&FaceId, &[VertexId; 3])| mesh.triangles()[f.index()] == t.map(|v| chart.vertices()[v.index()]);
-        debug_assert!(chart.faces().iter().zip(chart.triangles()).all(same));
         let vertices = chart.vertices().iter().map(|v| self.at_vertex(*v));
         let middles = chart.edges().iter().map(|(_, sides)| self.at_middle(mesh, on_surface(chart, sides[0])));
         vertices.chain(middles).collect()

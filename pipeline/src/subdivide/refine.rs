@@ -17,7 +17,7 @@
 
 use super::nodes::{Nodes, on_surface};
 use super::{Inverted, LinearChart};
-use crate::atlas::Chart;
+use crate::atlas::{CertifiedAtlas, CertifiedChart};
 use crate::certify::PlanarMap;
 use crate::grid::{GridPoint, orientation};
 use crate::mesh::SurfaceMesh;
@@ -51,21 +51,20 @@ type Part = [Corner; 3];
 /// The charts that need more than `depth` (at most [`DEPTH`]) splits of a part, or too many of them.
 pub(super) fn refine(
     depth: u32,
-    mesh: &SurfaceMesh,
-    charts: &[Chart],
+    atlas: &CertifiedAtlas,
     maps: &[&PlanarMap],
     nodes: &mut Nodes,
     linear: &mut [LinearChart],
 ) -> Result<usize, Vec<Inverted>> {
     let mut queue = BTreeSet::new();
-    for (chart, l) in charts.iter().zip(linear.iter()) {
+    for (chart, l) in atlas.charts().iter().zip(linear.iter()) {
         let inverted = l.triangles.iter().zip(&l.faces).filter(|(t, _)| !l.turns_left(**t));
-        queue.extend(inverted.map(|(_, f)| chart.faces()[*f as usize].0));
+        queue.extend(inverted.map(|(_, f)| chart.chart().faces()[*f as usize].0));
     }
     if queue.is_empty() {
         return Ok(0);
     }
-    let mut refiner = Refiner::new(mesh, charts, maps, nodes, linear);
+    let mut refiner = Refiner::new(atlas, maps, nodes, linear);
     refiner.deepest = depth.min(DEPTH);
     refiner.run(queue);
     if refiner.failed.is_empty() { Ok(refiner.replace()) } else { Err(refiner.failed.into_values().collect()) }
@@ -73,7 +72,7 @@ pub(super) fn refine(
 
 struct Refiner<'a> {
     mesh: &'a SurfaceMesh,
-    charts: &'a [Chart],
+    charts: &'a [CertifiedChart],
     maps: &'a [&'a PlanarMap],
     nodes: &'a mut Nodes,
     linear: &'a mut [LinearChart],
@@ -92,15 +91,15 @@ struct Refiner<'a> {
 
 impl<'a> Refiner<'a> {
     fn new(
-        mesh: &'a SurfaceMesh,
-        charts: &'a [Chart],
+        atlas: &'a CertifiedAtlas,
         maps: &'a [&'a PlanarMap],
         nodes: &'a mut Nodes,
         linear: &'a mut [LinearChart],
     ) -> Self {
+        let (mesh, charts) = (atlas.mesh(), atlas.charts());
         let mut owner = vec![(u32::MAX, 0); mesh.triangles().len()];
         let mut around: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-        for (chart, c) in charts.iter().zip(0..) {
+        for (chart, c) in charts.iter().map(CertifiedChart::chart).zip(0..) {
             chart.faces().iter().zip(0..).for_each(|(face, f)| owner[face.index()] = (c, f));
             for h in chart.outer().iter().chain(chart.holes().iter().flatten()) {
                 let h = on_surface(chart, *h);
@@ -146,7 +145,7 @@ impl<'a> Refiner<'a> {
         if self.failed.contains_key(&id) || self.is_settled(face, &part) {
             return;
         }
-        if depth == self.deepest || halved > HALVED.max(self.charts[chart as usize].triangles().len()) {
+        if depth == self.deepest || halved > HALVED.max(self.charts[chart as usize].chart().triangles().len()) {
             self.failed.insert(id, Inverted { chart: id, face: FaceId(local), depth: 1 + depth, halved });
             return;
         }
@@ -244,7 +243,7 @@ impl<'a> Refiner<'a> {
         let corners = faces.iter().flat_map(|f| cells[*f as usize]);
         let mut local: BTreeMap<u32, u32> = corners.map(|n| (old.nodes[n as usize], n)).collect();
         for f in faces {
-            let face = self.charts[chart].faces()[*f as usize].0;
+            let face = self.charts[chart].chart().faces()[*f as usize].0;
             for part in self.quarters(face).iter().flat_map(|q| self.leaves(q)) {
                 let triangle = part.map(|corner| {
                     *local.entry(corner.node).or_insert_with(|| {

@@ -1,39 +1,46 @@
 use super::*;
-use crate::atlas::Atlas;
+use crate::atlas::CertifiedChart;
 use crate::certify::{PlanarMap, prove};
 use crate::mesh::TriangleSoup;
+use crate::parametrize::parametrize_chart;
 use crate::seams::tests::{labelled, sector};
 use crate::vec3::distance;
-use crate::{Order, finish_chart, map_chart, shapes};
+use crate::{Order, shapes};
 
-/// A surface with one chart per label, and their maps.
+/// An atlas with one chart per label, and maps by straight triangles.
 struct Sample {
-    mesh: SurfaceMesh,
-    atlas: Atlas,
-    maps: Vec<CertifiedChart>,
+    atlas: CertifiedAtlas,
     straight: Vec<Option<StraightMap>>,
-    network: SeamNetwork,
 }
 
 impl Sample {
     fn new(soup: &TriangleSoup, label: impl Fn(Vec3) -> u32) -> Self {
+        Self::with(soup, label, |chart| chart)
+    }
+
+    /// As [`Self::new`], with other maps of the charts.
+    fn with(
+        soup: &TriangleSoup,
+        label: impl Fn(Vec3) -> u32,
+        change: impl Fn(CertifiedChart) -> CertifiedChart,
+    ) -> Self {
         let (mesh, atlas) = labelled(soup, label);
-        let certified = |c| finish_chart(map_chart(c, Order::Quadratic).expect("maps"));
-        let maps: Vec<CertifiedChart> = atlas.charts().iter().map(certified).collect();
-        let straight = vec![None; maps.len()];
-        let network = SeamNetwork::new(&mesh, atlas.charts(), 0.0);
-        Self { mesh, atlas, maps, straight, network }
+        let certified = |chart| change(parametrize_chart(chart, Order::Quadratic).expect("maps"));
+        let charts: Vec<CertifiedChart> = atlas.into_charts().into_iter().map(certified).collect();
+        let straight = vec![None; charts.len()];
+        let size = Some(f64::MIN_POSITIVE);
+        Self { atlas: CertifiedAtlas::gather(mesh, charts, size).expect("an atlas"), straight }
     }
 
     fn subdivide(&self) -> Result<LinearAtlas, Error> {
         let straight: Vec<Option<&StraightMap>> = self.straight.iter().map(Option::as_ref).collect();
-        subdivide(&self.mesh, self.atlas.charts(), &self.maps, &straight, &self.network)
+        subdivide(&self.atlas, &straight)
     }
 
     /// Subdivides, and looks at all that is promised.
     fn verified(&self) -> LinearAtlas {
         let linear = self.subdivide().expect("subdivides");
-        for (chart, c) in linear.charts().iter().zip(self.atlas.charts()) {
+        for (chart, c) in linear.charts().iter().zip(self.atlas.charts().iter().map(CertifiedChart::chart)) {
             assert!(chart.triangles().iter().all(|t| chart.turns_left(*t)), "every triangle turns left");
             assert!(chart.uv().iter().all(|p| GridPoint::exact(p.uv()) == Some(*p)), "places are doubles");
             assert_eq!(self.open_sides(chart), self.sides_of_curves(&linear, c), "boundaries are the curves");
@@ -55,7 +62,7 @@ impl Sample {
 
     fn sides_of_curves(&self, linear: &LinearAtlas, chart: &Chart) -> Vec<(u32, u32)> {
         let mut sides = Vec::new();
-        for passage in self.network.loops(chart.id()).iter().flatten() {
+        for passage in self.atlas.seams().loops(chart.id()).iter().flatten() {
             let along = linear.curves()[passage.curve.index()].windows(2).map(|w| (w[0], w[1]));
             sides.extend(along.map(|(a, b)| if passage.forward { (a, b) } else { (b, a) }));
         }
@@ -64,7 +71,7 @@ impl Sample {
     }
 
     fn verify_curves(&self, linear: &LinearAtlas) {
-        for (curve, nodes) in self.network.curves().iter().zip(linear.curves()) {
+        for (curve, nodes) in self.atlas.seams().curves().iter().zip(linear.curves()) {
             assert_eq!(curve.is_closed(), nodes[0] == nodes[nodes.len() - 1]);
             let points: Vec<Vec3> = nodes.iter().map(|n| linear.points()[*n as usize]).collect();
             let length: f64 = points.windows(2).map(|w| distance(w[0], w[1])).sum();
@@ -90,7 +97,7 @@ fn charts_become_triangulations_that_share_their_seams() {
     ];
     for sample in samples {
         let linear = sample.verified();
-        assert!(linear.triangle_count() >= 4 * sample.mesh.triangles().len());
+        assert!(linear.triangle_count() >= 4 * sample.atlas.mesh().triangles().len());
         assert_eq!((linear.moved(), linear.linear_charts()), (0, &[][..]));
     }
 }
@@ -101,7 +108,7 @@ fn a_chart_that_needs_too_many_parts_is_handed_over_by_its_linear_map() {
     let sample = Sample::new(&shapes::bent_disk(12, 0.45, 1.0), |p| sector(p, 2));
     let linear = sample.verified();
     assert!(linear.linear_charts().contains(&ChartId(0)), "{:?}", linear.linear_charts());
-    assert!(linear.triangle_count() < 8 * sample.mesh.triangles().len());
+    assert!(linear.triangle_count() < 8 * sample.atlas.mesh().triangles().len());
 }
 
 #[test]
@@ -111,8 +118,7 @@ fn a_chart_is_handed_over_by_its_projection_where_there_is_one() {
     let flat = TriangleSoup::new(flat, plate.triangles().to_vec()).expect("sound");
     let mut sample = Sample::new(&flat, |p| u32::from(p[0] > 0.1));
     let charts = sample.atlas.charts();
-    sample.straight =
-        charts.iter().map(|c| crate::map::natural::projection(&sample.mesh, c, 4.0).map(|p| p.map)).collect();
+    sample.straight = charts.iter().map(|c| crate::map::natural::projection(c.chart(), 4.0).map(|p| p.map)).collect();
     let linear = sample.verified();
     assert_eq!((linear.straight_charts().len(), linear.refined()), (sample.atlas.charts().len(), 0));
     for chart in linear.charts() {
@@ -142,19 +148,25 @@ fn inverted(chart: &Chart) -> CertifiedMap {
 
 /// Every side of a tetrahedron is a chart of its own, mapped like [`inverted`] where asked for.
 fn tetrahedron(is_inverted: [bool; 4]) -> Sample {
+    tetrahedron_with(|chart| {
+        if !is_inverted[chart.id().index()] {
+            return chart;
+        }
+        let (map, start) = (inverted(chart.chart()), chart.start().clone());
+        chart.with_maps(map, start)
+    })
+}
+
+/// Every side of a tetrahedron is a chart of its own, with another map.
+fn tetrahedron_with(change: impl Fn(CertifiedChart) -> CertifiedChart) -> Sample {
     let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
     let number = |p: Vec3| {
         let zero = (0..3).find(|k| p[*k] == 0.0);
         zero.map_or(2, |k| [3, 1, 0][k])
     };
-    let mut sample = Sample::new(&TriangleSoup::new(points, triangles).expect("sound"), number);
-    for (chart, map) in sample.atlas.charts().iter().zip(&mut sample.maps) {
-        if is_inverted[chart.id().index()] {
-            map.certified = inverted(chart);
-        }
-    }
-    sample
+    let soup = TriangleSoup::new(points, triangles).expect("sound");
+    Sample::with(&soup, number, change)
 }
 
 #[test]
@@ -191,11 +203,14 @@ fn hair(chart: &Chart) -> CertifiedMap {
 
 #[test]
 fn charts_too_thin_to_be_halved_make_their_neighbours_plainer() {
-    let mut sample = tetrahedron([true, false, false, false]);
-    for chart in 1..4 {
-        let thin = hair(&sample.atlas.charts()[chart]);
-        (sample.maps[chart].certified, sample.maps[chart].start) = (thin.clone(), thin);
-    }
+    let sample = tetrahedron_with(|chart| {
+        if chart.id() == ChartId(0) {
+            let (map, start) = (inverted(chart.chart()), chart.start().clone());
+            return chart.with_maps(map, start);
+        }
+        let thin = hair(chart.chart());
+        chart.with_maps(thin.clone(), thin)
+    });
     let linear = sample.verified();
     assert!(linear.linear_charts().contains(&ChartId(0)), "{:?}", linear.linear_charts());
     assert_eq!(linear.refined(), 0, "nothing is halved any more");
@@ -203,8 +218,8 @@ fn charts_too_thin_to_be_halved_make_their_neighbours_plainer() {
 
 /// How many parts of the first chart are inverted when every triangle is split into four.
 fn quartered_inverted_parts(sample: &Sample) -> usize {
-    let nodes = Nodes::new(&sample.mesh, &sample.network, sample.atlas.charts());
-    let chart = quartered(&sample.mesh, &sample.atlas.charts()[0], sample.maps[0].certified.map(), &nodes);
+    let (nodes, first) = (Nodes::new(&sample.atlas), &sample.atlas.charts()[0]);
+    let chart = quartered(sample.atlas.mesh(), first.chart(), first.map().map(), &nodes);
     chart.triangles.iter().filter(|t| !chart.turns_left(**t)).count()
 }
 
@@ -212,11 +227,11 @@ fn quartered_inverted_parts(sample: &Sample) -> usize {
 fn refinement_that_may_not_go_deep_enough_names_the_triangle() {
     let sample = tetrahedron([false, true, false, false]);
     let charts = sample.atlas.charts();
-    let maps: Vec<&PlanarMap> = sample.maps.iter().map(|m| m.certified.map()).collect();
-    let mut nodes = Nodes::new(&sample.mesh, &sample.network, charts);
-    let mut linear: Vec<LinearChart> =
-        charts.iter().zip(&maps).map(|(c, m)| quartered(&sample.mesh, c, m, &nodes)).collect();
-    let found = refine::refine(0, &sample.mesh, charts, &maps, &mut nodes, &mut linear);
+    let maps: Vec<&PlanarMap> = charts.iter().map(|c| c.map().map()).collect();
+    let mut nodes = Nodes::new(&sample.atlas);
+    let quarters = |(c, m): (&CertifiedChart, &&PlanarMap)| quartered(sample.atlas.mesh(), c.chart(), m, &nodes);
+    let mut linear: Vec<LinearChart> = charts.iter().zip(&maps).map(quarters).collect();
+    let found = refine::refine(0, &sample.atlas, &maps, &mut nodes, &mut linear);
     assert_eq!(found, Err(vec![Inverted { chart: ChartId(1), face: FaceId(0), depth: 1, halved: 0 }]));
 }
 
@@ -230,8 +245,9 @@ fn triangles_without_a_normal_get_one_and_others_stay() {
     for chart in linear.charts() {
         assert!(chart.triangles().iter().all(|t| crate::vec3::triangle_area(corners(chart, *t)) > 0.0));
     }
-    let furthest = strip.mesh.points().iter().zip(linear.points()).map(|(p, q)| distance(*p, *q)).fold(0.0, f64::max);
-    assert!(furthest <= 32.0 * 1e-12 * strip.mesh.bounding_box().diagonal(), "{furthest}");
+    let furthest =
+        strip.atlas.mesh().points().iter().zip(linear.points()).map(|(p, q)| distance(*p, *q)).fold(0.0, f64::max);
+    assert!(furthest <= 32.0 * 1e-12 * strip.atlas.mesh().bounding_box().diagonal(), "{furthest}");
     // The same strip with its last triangles lifted has nothing to move.
     let lifted: Vec<Vec3> =
         shapes::sliver_strip(12).points().iter().map(|p| [p[0], p[1], p[0].fract() * (1.0 + p[0])]).collect();
@@ -241,9 +257,9 @@ fn triangles_without_a_normal_get_one_and_others_stay() {
 
 /// How many parts of the first chart have no area when every triangle is split into four.
 fn flat_quartered_parts(sample: &Sample) -> usize {
-    let nodes = Nodes::new(&sample.mesh, &sample.network, sample.atlas.charts());
-    let chart = quartered(&sample.mesh, &sample.atlas.charts()[0], sample.maps[0].certified.map(), &nodes);
-    let points = nodes.positions(&sample.mesh);
+    let (nodes, first) = (Nodes::new(&sample.atlas), &sample.atlas.charts()[0]);
+    let chart = quartered(sample.atlas.mesh(), first.chart(), first.map().map(), &nodes);
+    let points = nodes.positions(sample.atlas.mesh());
     let corners = |t: &[u32; 3]| t.map(|n| points[chart.nodes[n as usize] as usize]);
     chart.triangles.iter().filter(|t| crate::vec3::triangle_area(corners(t)) == 0.0).count()
 }

@@ -1,7 +1,7 @@
 //! Which triangles meet along which edge. The table never sees positions, and takes any triangulation:
 //! non-manifold and inconsistently oriented ones too.
 
-use crate::topology::csr::Buckets;
+use crate::topology::csr::Csr;
 use crate::topology::{EdgeId, FaceId, HalfEdgeId, VertexId};
 
 /// The edges of a triangulation, each with the half-edges that run along it in either direction.
@@ -10,63 +10,70 @@ use crate::topology::{EdgeId, FaceId, HalfEdgeId, VertexId};
 #[derive(Clone, Debug)]
 pub struct EdgeTable {
     edge_of: Vec<EdgeId>,
-    starts: Vec<u32>,
-    sides: Vec<HalfEdgeId>,
+    sides: Csr<HalfEdgeId>,
+}
+
+/// The ends of an edge, the lesser one first.
+fn ordered(t: &[VertexId; 3], side: usize) -> (u32, u32) {
+    let (from, to) = (t[side].0, t[(side + 1) % 3].0);
+    (from.min(to), from.max(to))
 }
 
 impl EdgeTable {
     /// Finds the edges of `triangles`, whose corners are distinct.
     pub fn new(triangles: &[[VertexId; 3]]) -> Self {
-        let ends = |t: &[VertexId; 3]| [0, 1, 2].map(|k| (t[k].0.min(t[(k + 1) % 3].0), t[k].0.max(t[(k + 1) % 3].0)));
-        let half_edges = || triangles.iter().flat_map(ends).zip(0_u32..).map(|((low, high), h)| (low, (high, h)));
+        let ends = triangles.iter().flat_map(|t| [0, 1, 2].map(|side| ordered(t, side)));
+        let by_lower_end = || ends.clone().zip(0_u32..).map(|((low, high), h)| (low, (high, h)));
         let vertices = triangles.iter().flatten().map(|v| v.index() + 1).max().unwrap_or(0);
-        let mut at_lower_end = Buckets::new(vertices, half_edges);
-        let mut sides: Vec<u32> = Vec::with_capacity(3 * triangles.len());
+        let mut at_lower_end = Csr::sorted(vertices, by_lower_end);
+        let mut groups: Csr<HalfEdgeId> = Csr::with_capacity(3 * triangles.len());
         let mut group_of = vec![0_u32; 3 * triangles.len()];
-        let mut groups: Vec<(u32, u32)> = Vec::new();
         for v in 0..vertices {
-            let around = at_lower_end.get_mut(v);
+            let around = at_lower_end.row_mut(v);
             around.sort_unstable();
-            for chunk in around.chunk_by(|a, b| a.0 == b.0) {
-                chunk.iter().for_each(|&(_, h)| group_of[h as usize] = groups.len() as u32);
-                groups.push((sides.len() as u32, (sides.len() + chunk.len()) as u32));
-                sides.extend(chunk.iter().map(|(_, h)| *h));
+            for same_edge in around.chunk_by(|a, b| a.0 == b.0) {
+                for &(_, h) in same_edge {
+                    group_of[h as usize] = groups.len() as u32;
+                }
+                groups.push_row(same_edge.iter().map(|(_, h)| HalfEdgeId(*h)));
             }
         }
-        Self::numbered(&sides, &group_of, &groups)
+        Self::numbered(&groups, &group_of)
     }
 
-    /// Numbers the groups of equal edges by their first half-edge.
-    fn numbered(sides: &[u32], group_of: &[u32], groups: &[(u32, u32)]) -> Self {
+    /// Numbers groups of half-edges along one edge by their first half-edge.
+    fn numbered(groups: &Csr<HalfEdgeId>, group_of: &[u32]) -> Self {
         let unseen = EdgeId(u32::MAX);
         let mut number = vec![unseen; groups.len()];
-        let mut table = Self { edge_of: Vec::with_capacity(sides.len()), starts: vec![0], sides: Vec::new() };
+        let mut table = Self::with_capacity(group_of.len());
         for &group in group_of {
-            let (start, end) = groups[group as usize];
-            if number[group as usize] == unseen {
-                number[group as usize] = EdgeId::at(table.starts.len() - 1);
-                table.sides.extend(sides[start as usize..end as usize].iter().map(|h| HalfEdgeId(*h)));
-                table.starts.push(table.sides.len() as u32);
+            let number = &mut number[group as usize];
+            if *number == unseen {
+                *number = EdgeId::at(table.sides.len());
+                table.sides.push_row(groups.row(group as usize).iter().copied());
             }
-            table.edge_of.push(number[group as usize]);
+            table.edge_of.push(*number);
         }
         table
+    }
+
+    fn with_capacity(half_edges: usize) -> Self {
+        Self { edge_of: Vec::with_capacity(half_edges), sides: Csr::with_capacity(half_edges) }
     }
 
     /// The table of a part of the triangulation: of `faces`, ascending, of which `local` tells the place in the part.
     /// It is the table that [`Self::new`] would find, without the sort.
     pub(crate) fn part(&self, faces: &[FaceId], local: impl Fn(FaceId) -> Option<FaceId>) -> Self {
-        let mut table = Self { edge_of: Vec::with_capacity(3 * faces.len()), starts: vec![0], sides: Vec::new() };
+        let mut table = Self::with_capacity(3 * faces.len());
         let inside = |h: &HalfEdgeId| Some(HalfEdgeId::side_of(local(h.face())?, h.side()));
-        for h in faces.iter().flat_map(|f| [0, 1, 2].map(|k| HalfEdgeId::side_of(*f, k))) {
+        for h in faces.iter().flat_map(|f| f.sides()) {
             let mut sides = self.sides(self.edge(h)).iter().filter_map(inside).peekable();
             // Sides ascend: the first one meets the edge first.
             let edge = match sides.peek().and_then(|first| table.edge_of.get(first.index())) {
                 Some(known) => *known,
                 None => {
-                    table.sides.extend(sides);
-                    table.starts.push(table.sides.len() as u32);
-                    EdgeId::at(table.starts.len() - 2)
+                    table.sides.push_row(sides);
+                    EdgeId::at(table.sides.len() - 1)
                 }
             };
             table.edge_of.push(edge);
@@ -76,7 +83,7 @@ impl EdgeTable {
 
     /// The number of edges.
     pub fn len(&self) -> usize {
-        self.starts.len() - 1
+        self.sides.len()
     }
 
     /// Whether there is no edge.
@@ -91,7 +98,7 @@ impl EdgeTable {
 
     /// All half-edges along `edge`, ascending: one at the boundary, two inside, more where sheets meet.
     pub fn sides(&self, edge: EdgeId) -> &[HalfEdgeId] {
-        &self.sides[self.starts[edge.index()] as usize..self.starts[edge.index() + 1] as usize]
+        self.sides.row(edge.index())
     }
 
     /// The half-edge on the other side, where exactly two triangles meet.
@@ -109,7 +116,7 @@ impl EdgeTable {
 
     /// All edges with their sides.
     pub fn iter(&self) -> impl Iterator<Item = (EdgeId, &[HalfEdgeId])> {
-        (0..self.len()).map(|e| (EdgeId::at(e), self.sides(EdgeId::at(e))))
+        (0..self.len()).map(EdgeId::at).map(|e| (e, self.sides(e)))
     }
 }
 
@@ -140,7 +147,7 @@ mod tests {
             let triangles: Vec<_> = faces.iter().map(|f| all[f.index()]).collect();
             let part = table.part(&faces, |f| faces.binary_search(&f).ok().map(FaceId::at));
             let anew = EdgeTable::new(&triangles);
-            assert_eq!((part.edge_of, part.starts, part.sides), (anew.edge_of, anew.starts, anew.sides));
+            assert_eq!((part.edge_of, part.sides), (anew.edge_of, anew.sides));
         }
     }
 

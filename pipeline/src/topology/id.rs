@@ -68,6 +68,13 @@ id!(
     "s"
 );
 
+impl FaceId {
+    /// The three half-edges around this triangle, from corner 0 on.
+    pub fn sides(self) -> [HalfEdgeId; 3] {
+        [0, 1, 2].map(|side| HalfEdgeId::side_of(self, side))
+    }
+}
+
 impl HalfEdgeId {
     /// Side `side` (0, 1 or 2) of `face`.
     pub fn side_of(face: FaceId, side: usize) -> Self {
@@ -112,6 +119,7 @@ mod tests {
             for side in 0..3 {
                 let h = HalfEdgeId::side_of(face, side);
                 assert_eq!((h.face(), h.side()), (face, side));
+                assert_eq!(face.sides()[side], h);
                 assert_eq!(h.next().next().next(), h);
                 assert_eq!(h.next().prev(), h);
             }

@@ -10,9 +10,11 @@ mod edges;
 mod id;
 mod stars;
 pub(crate) mod union_find;
+mod visits;
 
 pub use census::{Census, Umbrellas};
 pub(crate) use census::{count_components, orientation};
 pub use edges::EdgeTable;
 pub use id::{ChartId, CurveId, EdgeId, FaceId, HalfEdgeId, VertexId};
 pub use stars::Stars;
+pub(crate) use visits::VisitStamps;

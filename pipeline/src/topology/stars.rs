@@ -1,34 +1,24 @@
 //! The star of a vertex: the triangles around it.
 
 use crate::topology::VertexId;
+use crate::topology::csr::Csr;
 
 /// Per vertex, the triangles around it, ascending.
 #[derive(Clone, Debug)]
 pub struct Stars {
-    starts: Vec<u32>,
-    faces: Vec<u32>,
+    faces: Csr<u32>,
 }
 
 impl Stars {
     /// The stars of `vertices` vertices in `triangles`.
     pub fn new(triangles: &[[VertexId; 3]], vertices: usize) -> Self {
-        let mut starts = vec![0_u32; vertices + 1];
-        triangles.iter().flatten().for_each(|v| starts[v.index() + 1] += 1);
-        (0..vertices).for_each(|v| starts[v + 1] += starts[v]);
-        let mut next = starts.clone();
-        let mut faces = vec![0; starts[vertices] as usize];
-        for (f, t) in triangles.iter().enumerate() {
-            for v in t {
-                faces[next[v.index()] as usize] = f as u32;
-                next[v.index()] += 1;
-            }
-        }
-        Self { starts, faces }
+        let corners = || (0_u32..).zip(triangles).flat_map(|(face, t)| t.map(|v| (v.0, face)));
+        Self { faces: Csr::sorted(vertices, corners) }
     }
 
     /// The triangles around a vertex.
     pub fn around(&self, vertex: usize) -> &[u32] {
-        &self.faces[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+        self.faces.row(vertex)
     }
 }
 

@@ -1,14 +1,15 @@
-//! The feasible path: a log-barrier method from the raised linear map.
+//! The feasible path: a log-barrier method from the degree-elevated linear map.
 
-use super::newton::minimise;
+use super::newton::{Limits, minimise};
+use super::objective::Objective;
 use super::penalty::{Bound, Penalty};
 use super::problem::{Cell, Problem};
-use super::{Effort, on_grid, places, region};
+use super::{Stats, on_grid, region, uv_of};
 use crate::fem::sparse::Error;
 use crate::grid::GridPoint;
-use crate::map::closed::ClosedChart;
-use crate::map::quadratic::energies;
+use crate::map::filled::FilledChart;
 use crate::monitor::Checkpoint;
+use crate::topology::FaceId;
 
 /// The weights of the barrier, relative to the energy of each triangle.
 const WEIGHTS: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
@@ -23,45 +24,73 @@ const TOLERANCE: f64 = 1e-9;
 /// The share of its value in the start that every coefficient keeps.
 const KEPT: f64 = 1e-3;
 
-/// Descends from `start`; `None` where the systems are too large or cannot be factorised, or nobody waits any more.
-pub(super) fn untangle(
-    chart: &ClosedChart,
+/// What triangles weigh at least, relative to the mean: where the objective is nothing a barrier is wanted all the same.
+const MIN_WEIGHT: f64 = 1e-6;
+
+/// Descends from `start`.
+///
+/// # Errors
+/// [`Error`]: the systems are too large or cannot be factorised, or interrupted.
+pub(super) fn untangle<O: Objective>(
+    chart: &FilledChart,
+    objective: &O,
     start: &[GridPoint],
-    effort: &mut Effort,
+    stats: &mut Stats,
     checkpoint: &Checkpoint,
-) -> Option<Vec<GridPoint>> {
-    checkpoint.after(chart.triangles().len()).ok()?;
+) -> Result<Vec<GridPoint>, Error> {
+    checkpoint.after(chart.triangles().len())?;
     let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-    let mut all = places(start, &centres);
-    let energies: Vec<f64> = energies(chart, &all).collect();
-    let mean = energies.iter().sum::<f64>() / chart.own_triangles() as f64;
-    let mut problem = problem(chart, &energies, mean, checkpoint);
+    let mut all = uv_of(start, &centres);
+    let weights = weights(chart, objective, &all);
+    let mut problem = problem(chart, objective, &weights, checkpoint);
     let mut x = problem.gather(&all);
     problem
         .for_each_bound(&x, |c, bound| *bound = Bound { scale: c, floor: KEPT * c, weight: bound.weight, dual: None });
-    descend(&mut problem, &mut x, effort).ok()?;
-    problem.moved(&x).for_each(|(n, p)| all[n] = *p);
-    Some(on_grid(chart, &all))
+    descend(&mut problem, &mut x, stats)?;
+    for moved in problem.moved(&x) {
+        all[moved.node] = moved.uv;
+    }
+    Ok(on_grid(chart, &all))
 }
 
-fn unset(weight: f64) -> Bound {
-    Bound { scale: 1.0, floor: 0.0, weight, dual: None }
+/// How much the penalties count, before they are scaled.
+struct Weights {
+    /// Per triangle: its share of the objective.
+    of_faces: Vec<f64>,
+    /// The mean share.
+    mean: f64,
 }
 
-/// All triangles, with weights proportional to their energies but bounds still unset; every node may move but those
-/// of the outer loop.
-fn problem<'a>(chart: &'a ClosedChart, energies: &[f64], mean: f64, checkpoint: &'a Checkpoint) -> Problem<'a> {
-    let own = chart.own_triangles() as u32;
-    let bounds = |face: u32| (face < own).then(|| [unset(energies[face as usize].max(1e-6 * mean)); 6]);
-    let cells = (0..chart.triangles().len() as u32).map(|face| Cell { face, bounds: bounds(face) }).collect();
-    let fixed = region::fixed_nodes(chart);
+/// The weights by the objective at `x`.
+fn weights<O: Objective>(chart: &FilledChart, objective: &O, x: &[[f64; 2]]) -> Weights {
+    let value = |f: usize| objective.value(FaceId::at(f), &chart.nodes(f).map(|n| x[n]));
+    let values: Vec<f64> = (0..chart.triangles().len()).map(value).collect();
+    let mean = values.iter().sum::<f64>() / chart.chart_triangles() as f64;
+    Weights { of_faces: values.into_iter().map(|v| v.max(MIN_WEIGHT * mean)).collect(), mean }
+}
+
+/// All triangles, with their weights but bounds still unset; every node may move but those of the outer loop.
+fn problem<'a, O: Objective>(
+    chart: &'a FilledChart,
+    objective: &'a O,
+    weights: &Weights,
+    checkpoint: &'a Checkpoint,
+) -> Problem<'a, O> {
+    let unset = |weight: f64| Bound { scale: 1.0, floor: 0.0, weight, dual: None };
+    let cell = |f: usize| Cell {
+        face: FaceId::at(f),
+        bounds: (f < chart.chart_triangles()).then(|| [unset(weights.of_faces[f]); 6]),
+    };
+    let cells = (0..chart.triangles().len()).map(cell).collect();
+    let is_outer = chart.outer_nodes();
     let centres = chart.node_count()..chart.node_count() + chart.loops().len();
-    let free: Vec<u32> = (0..fixed.len()).filter(|n| !fixed[*n]).chain(centres).map(|n| n as u32).collect();
-    Problem::new(chart, cells, region::arc_cells(chart, |_| true, unset(mean)), &free, checkpoint)
+    let free: Vec<u32> = (0..is_outer.len()).filter(|n| !is_outer[*n]).chain(centres).map(|n| n as u32).collect();
+    let arcs = region::arc_cells(chart, |_| true, unset(weights.mean));
+    Problem::new(chart, objective, cells, arcs, &free, checkpoint)
 }
 
 /// Minimises with falling weights.
-fn descend(problem: &mut Problem, x: &mut super::Places, effort: &mut Effort) -> Result<(), Error> {
+fn descend<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &mut Stats) -> Result<(), Error> {
     if problem.unknowns() == 0 {
         return Ok(());
     }
@@ -69,11 +98,12 @@ fn descend(problem: &mut Problem, x: &mut super::Places, effort: &mut Effort) ->
     problem.checkpoint()?;
     let analysis = pattern.analyse()?;
     let steps = (WORK / problem.cells.len()).clamp(STEPS[0], STEPS[1]);
+    let limits = Limits { steps, tolerance: TOLERANCE };
     let mut last = 1.0;
     for weight in WEIGHTS {
         problem.scale_weights(weight / last);
         last = weight;
-        effort.add(minimise(problem, (&pattern, &analysis), x, Penalty::Barrier, (steps, TOLERANCE))?);
+        stats.add(minimise(problem, &analysis, x, Penalty::Barrier, limits)?);
     }
     Ok(())
 }

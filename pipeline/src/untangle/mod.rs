@@ -1,13 +1,13 @@
 //! Untangle: towards the harmonic map, inside the certified ones.
 //!
-//! Minimises the Dirichlet energy 1/2 int |grad u|^2 + |grad v|^2 (on the surface: distortion is measured against
-//! the triangles in space) under the constraint that every jacobian is positive, with the outer boundary fixed.
+//! Minimises an [`Objective`], the [`Dirichlet`] energy (on the surface: distortion is measured against the triangles in
+//! space), under the constraint that every jacobian is positive, with the outer boundary fixed.
 //!
 //! * **Nothing to do** where the harmonic map is valid and every hole can be seen from a point inside.
 //! * **The patch path**, where few triangles are invalid: only a few rings around them move. A regularised penalty
 //!   that accepts an invalid start pulls them over (Garanzha and co-workers 2021, doi 10.1145/3450626.3459847), then
 //!   a log barrier brings the patch back towards the harmonic map. Patches that do not yield grow.
-//! * **The feasible path** always succeeds: the linear map, raised to quadratic elements, is valid; a log barrier
+//! * **The feasible path** always succeeds: the linear map, degree-elevated, is valid; a log barrier
 //!   method descends from it and never leaves the valid set. All nodes inside move, and a star centre for each hole.
 //! * **The start itself**, if the result of the feasible path does not survive rounding to the grid, or its
 //!   systems are too large.
@@ -20,6 +20,7 @@
 
 mod feasible;
 mod newton;
+mod objective;
 mod patch;
 mod penalty;
 mod problem;
@@ -27,11 +28,14 @@ mod region;
 mod terms;
 
 use crate::certify::{Arc, star_centre};
+use crate::fem::sparse;
 use crate::grid::GridPoint;
-use crate::map::closed::ClosedChart;
-use crate::map::quadratic::{self, QuadraticMap, energy, invalid_triangles};
-use crate::monitor::{Checkpoint, Monitor};
-use problem::Places;
+use crate::map::filled::FilledChart;
+use crate::map::quadratic::{self, QuadraticMap, invalid_triangles};
+use crate::monitor::{Checkpoint, Interrupted, Monitor};
+use crate::topology::FaceId;
+pub use objective::{Dirichlet, LocalModel, Objective};
+use patch::Stuck;
 
 /// Above this share of invalid triangles the feasible path is taken at once.
 const FEW: f64 = 0.1;
@@ -43,9 +47,9 @@ pub enum Method {
     Harmonic,
     /// Patches around invalid triangles moved.
     Patch,
-    /// A barrier method from the raised linear map.
+    /// A barrier method from the degree-elevated linear map.
     Feasible,
-    /// The raised linear map itself.
+    /// The degree-elevated linear map itself.
     Start,
 }
 
@@ -60,7 +64,7 @@ pub struct Report {
     pub nodes_moved: usize,
     /// Dirichlet energy of the harmonic map: a lower bound.
     pub energy_harmonic: f64,
-    /// Dirichlet energy of the raised linear map.
+    /// Dirichlet energy of the degree-elevated linear map.
     pub energy_start: f64,
     /// Dirichlet energy of the result.
     pub energy: f64,
@@ -71,20 +75,20 @@ pub struct Report {
 
 impl Report {
     /// The report where the start itself is the result.
-    pub(crate) fn of_start(self, chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap) -> Self {
+    pub(crate) fn of_start(self, chart: &FilledChart, start: &[GridPoint], harmonic: &QuadraticMap) -> Self {
         let nodes_moved = nodes_moved(chart, start, harmonic);
         Self { method: Method::Start, nodes_moved, energy: self.energy_start, gradient_norm: 0.0, ..self }
     }
 }
 
-fn nodes_moved(chart: &ClosedChart, nodes: &[GridPoint], harmonic: &QuadraticMap) -> usize {
-    (0..chart.own_nodes()).filter(|n| nodes[*n] != harmonic.nodes()[*n]).count()
+fn nodes_moved(chart: &FilledChart, nodes: &[GridPoint], harmonic: &QuadraticMap) -> usize {
+    (0..chart.chart_nodes()).filter(|n| nodes[*n] != harmonic.nodes()[*n]).count()
 }
 
 /// A map with a point in each hole, believed to be valid: [`crate::certify`] decides.
 #[derive(Clone, Debug)]
 pub struct Untangled {
-    /// The places of all nodes of the closed chart.
+    /// The uv_of of all nodes of the filled chart.
     pub nodes: Vec<GridPoint>,
     /// Per hole, a point from which its loop can be seen.
     pub hole_centres: Vec<GridPoint>,
@@ -94,86 +98,127 @@ pub struct Untangled {
 
 /// Steps and accuracy of one attempt.
 #[derive(Clone, Copy, Debug, Default)]
-struct Effort {
+struct Stats {
     iterations: usize,
     decrement: f64,
 }
 
-impl Effort {
+impl Stats {
     fn add(&mut self, outcome: newton::Outcome) {
         self.iterations += outcome.iterations;
         self.decrement = outcome.decrement;
     }
 }
 
-/// Untangles the harmonic map of `chart`; `start` is the valid raised linear map with the same boundary, and the result
-/// where nobody waits for a better one any more.
-pub fn untangle(chart: &ClosedChart, start: &[GridPoint], harmonic: &QuadraticMap, monitor: &dyn Monitor) -> Untangled {
-    let mut effort = Effort::default();
-    let (method, nodes, hole_centres) = best(chart, start, harmonic, &mut effort, &Checkpoint::new(monitor));
+/// Untangles the `harmonic` map of `chart`, the minimiser of `objective` that may be invalid; `start` is the valid
+/// degree-elevated linear map with the same boundary. The result is the start itself where nothing better is found.
+///
+/// # Errors
+/// [`Interrupted`].
+pub fn untangle<O: Objective>(
+    chart: &FilledChart,
+    objective: &O,
+    start: &[GridPoint],
+    harmonic: &QuadraticMap,
+    monitor: &dyn Monitor,
+) -> Result<Untangled, Interrupted> {
+    let mut stats = Stats::default();
+    let found = best(chart, objective, start, harmonic, &mut stats, &Checkpoint::new(monitor))?;
     let report = Report {
-        method,
-        iterations: effort.iterations,
-        nodes_moved: nodes_moved(chart, &nodes, harmonic),
-        energy_harmonic: harmonic.energy(),
-        energy_start: energy(chart, start),
-        energy: energy(chart, &nodes),
-        gradient_norm: effort.decrement.max(0.0).sqrt(),
+        method: found.method,
+        iterations: stats.iterations,
+        nodes_moved: nodes_moved(chart, &found.nodes, harmonic),
+        energy_harmonic: total(chart, objective, harmonic.uv()),
+        energy_start: total_on_grid(chart, objective, start),
+        energy: total_on_grid(chart, objective, &found.nodes),
+        gradient_norm: stats.decrement.max(0.0).sqrt(),
     };
-    Untangled { nodes, hole_centres, report }
+    Ok(Untangled { nodes: found.nodes, hole_centres: found.hole_centres, report })
+}
+
+/// The objective over all triangles, those of the fans included.
+fn total<O: Objective>(chart: &FilledChart, objective: &O, x: &[[f64; 2]]) -> f64 {
+    (0..chart.triangles().len()).map(|f| objective.value(FaceId::at(f), &chart.nodes(f).map(|n| x[n]))).sum()
+}
+
+fn total_on_grid<O: Objective>(chart: &FilledChart, objective: &O, nodes: &[GridPoint]) -> f64 {
+    total(chart, objective, &uv_of(nodes, &[]))
+}
+
+/// A valid map, with the way to it.
+struct Found {
+    method: Method,
+    nodes: Vec<GridPoint>,
+    hole_centres: Vec<GridPoint>,
 }
 
 /// The first of the paths that leads to a valid map.
-fn best(
-    chart: &ClosedChart,
+fn best<O: Objective>(
+    chart: &FilledChart,
+    objective: &O,
     start: &[GridPoint],
     harmonic: &QuadraticMap,
-    effort: &mut Effort,
+    stats: &mut Stats,
     checkpoint: &Checkpoint,
-) -> (Method, Vec<GridPoint>, Vec<GridPoint>) {
-    if let Some(centres) = valid(chart, harmonic.nodes()) {
-        return (Method::Harmonic, harmonic.nodes().to_vec(), centres);
+) -> Result<Found, Interrupted> {
+    let found = |method: Method, nodes: Vec<GridPoint>| {
+        valid(chart, &nodes).map(|hole_centres| Found { method, nodes, hole_centres })
+    };
+    if let Some(found) = found(Method::Harmonic, harmonic.nodes().to_vec()) {
+        return Ok(found);
     }
-    if harmonic.invalid().len() as f64 <= FEW * chart.own_triangles() as f64 {
-        let nodes = patch::untangle(chart, start, harmonic, effort, checkpoint);
-        if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
-            return (Method::Patch, nodes.unwrap_or_default(), centres);
+    if harmonic.invalid().len() as f64 <= FEW * chart.chart_triangles() as f64 {
+        match patch::untangle(chart, objective, start, harmonic, stats, checkpoint) {
+            Ok(nodes) => {
+                if let Some(found) = found(Method::Patch, nodes) {
+                    return Ok(found);
+                }
+            }
+            Err(Stuck::Interrupted(interrupted)) => return Err(interrupted),
+            // Then the whole chart moves.
+            Err(_) => {}
         }
     }
-    effort.decrement = 0.0;
-    let nodes = feasible::untangle(chart, start, effort, checkpoint);
-    if let Some(centres) = nodes.as_ref().and_then(|n| valid(chart, n)) {
-        return (Method::Feasible, nodes.unwrap_or_default(), centres);
+    stats.decrement = 0.0;
+    match feasible::untangle(chart, objective, start, stats, checkpoint) {
+        Ok(nodes) => {
+            if let Some(found) = found(Method::Feasible, nodes) {
+                return Ok(found);
+            }
+        }
+        Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted),
+        // Then the start is what there is.
+        Err(sparse::Error::Unsolvable(_)) => {}
     }
-    effort.decrement = 0.0;
-    let centres = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-    (Method::Start, start.to_vec(), centres)
+    stats.decrement = 0.0;
+    let hole_centres = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
+    Ok(Found { method: Method::Start, nodes: start.to_vec(), hole_centres })
 }
 
 /// If the map is valid and every hole can be seen from a point, these points.
-fn valid(chart: &ClosedChart, nodes: &[GridPoint]) -> Option<Vec<GridPoint>> {
+fn valid(chart: &FilledChart, nodes: &[GridPoint]) -> Option<Vec<GridPoint>> {
     let centres: Option<Vec<_>> = (0..chart.loops().len()).map(|k| centre_of_hole(chart, nodes, k)).collect();
     centres.filter(|_| invalid_triangles(chart, nodes).is_empty())
 }
 
 /// A point from which all of the loop around hole `k` can be seen.
-fn centre_of_hole(chart: &ClosedChart, nodes: &[GridPoint], k: usize) -> Option<GridPoint> {
+fn centre_of_hole(chart: &FilledChart, nodes: &[GridPoint], k: usize) -> Option<GridPoint> {
     let arcs: Vec<Arc> = chart.loops()[k].iter().map(|h| arc(chart, nodes, *h)).collect();
     star_centre(&arcs, nodes[chart.centre_node(k)])
 }
 
-fn arc(chart: &ClosedChart, nodes: &[GridPoint], h: crate::topology::HalfEdgeId) -> Arc {
+fn arc(chart: &FilledChart, nodes: &[GridPoint], h: crate::topology::HalfEdgeId) -> Arc {
     let [from, to] = chart.ends(h).map(|v| nodes[chart.vertex_node(v)]);
     Arc { from, mid: nodes[chart.mid_node(h)], to }
 }
 
 /// Places of all nodes as doubles, followed by the star centres.
-fn places(nodes: &[GridPoint], centres: &[GridPoint]) -> Places {
+fn uv_of(nodes: &[GridPoint], centres: &[GridPoint]) -> Vec<[f64; 2]> {
     nodes.iter().chain(centres).map(|p| p.uv()).collect()
 }
 
 /// The nodes of `x` on the grid.
-fn on_grid(chart: &ClosedChart, x: &Places) -> Vec<GridPoint> {
+fn on_grid(chart: &FilledChart, x: &[[f64; 2]]) -> Vec<GridPoint> {
     quadratic::to_grid(chart, &x[..chart.node_count()])
 }
 

@@ -1,8 +1,10 @@
 //! Newton's method with a line search that never leaves the region where the objective is finite.
 
+use super::objective::Objective;
 use super::penalty::Penalty;
-use super::problem::{Places, Problem, newton_step};
-use crate::fem::sparse::{Analysis, Error, Pattern};
+use super::problem::Problem;
+use crate::fem::sparse::{Analysis, Error};
+use crate::monitor::Interrupted;
 
 /// The share of the way to the nearest floor that one step may go.
 const SAFE: f64 = 0.95;
@@ -13,6 +15,15 @@ const DECREASE: f64 = 1e-4;
 /// How often a step is halved at most.
 const HALVINGS: u32 = 30;
 
+/// When Newton's method ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Steps at most.
+    pub steps: usize,
+    /// The promised decrease, relative to the objective, below which no step is made.
+    pub tolerance: f64,
+}
+
 /// How Newton's method ended.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outcome {
@@ -21,65 +32,74 @@ pub(super) struct Outcome {
     pub decrement: f64,
 }
 
-/// At most `most` steps, fewer where the promised decrease falls below `tolerance` (relative), or where rounding
-/// hides any decrease.
-pub(super) fn minimise(
-    problem: &mut Problem,
-    (pattern, analysis): (&Pattern, &Analysis),
-    x: &mut Places,
+/// Descends from `x` within `limits`; fewer steps where rounding hides any decrease.
+///
+/// # Errors
+/// [`Error`] of a system that cannot be factorised, or interrupted.
+pub(super) fn minimise<O: Objective>(
+    problem: &mut Problem<O>,
+    analysis: &Analysis,
+    x: &mut [[f64; 2]],
     penalty: Penalty,
-    (most, tolerance): (usize, f64),
+    limits: Limits,
 ) -> Result<Outcome, Error> {
-    let mut objective = problem.objective(x, penalty);
+    let mut value = problem.value(x, penalty);
     let mut outcome = Outcome { iterations: 0, decrement: 0.0 };
-    while outcome.iterations < most {
+    while outcome.iterations < limits.steps {
         problem.checkpoint()?;
-        let mut model = problem.model(x, penalty, pattern);
-        let step = newton_step(problem, (pattern, analysis), &mut model)?;
+        let mut model = problem.model(x, penalty, analysis.pattern());
+        let step = problem.newton_step(analysis, &mut model)?;
         let slope: f64 = step.iter().zip(&model.gradient).map(|(s, g)| s * g).sum();
-        outcome.decrement = -0.5 * slope / objective.abs().max(f64::MIN_POSITIVE);
-        if outcome.decrement.is_nan() || outcome.decrement <= tolerance {
+        outcome.decrement = -0.5 * slope / value.abs().max(f64::MIN_POSITIVE);
+        if outcome.decrement.is_nan() || outcome.decrement <= limits.tolerance {
             break;
         }
         let direction = problem.direction(&step);
-        let from = matches!(penalty, Penalty::Barrier).then(|| x.clone());
-        let Some(lower) = search(problem, x, &direction, penalty, objective, slope) else { break };
+        let from = matches!(penalty, Penalty::Barrier).then(|| x.to_vec());
+        let descent = Descent { direction: &direction, value, slope };
+        let Some(lower) = search(problem, x, &descent, penalty)? else { break };
         if let Some(from) = from {
             problem.update_duals(&from, &direction, x);
         }
-        objective = lower;
+        value = lower;
         outcome.iterations += 1;
     }
     Ok(outcome)
 }
 
-/// Moves `x` along `direction` as far as the objective falls as promised; the new objective, or `None` where no
-/// step brings a decrease.
-fn search(
-    problem: &Problem,
-    x: &mut Places,
-    direction: &Places,
-    penalty: Penalty,
-    objective: f64,
+/// A direction of descent, the value where it begins, and the slope along it.
+struct Descent<'a> {
+    direction: &'a [[f64; 2]],
+    value: f64,
     slope: f64,
-) -> Option<f64> {
+}
+
+/// Moves `x` along a direction as far as the value falls as promised; the new value, or `None` where no step brings a
+/// decrease and `x` stays.
+fn search<O: Objective>(
+    problem: &Problem<O>,
+    x: &mut [[f64; 2]],
+    descent: &Descent,
+    penalty: Penalty,
+) -> Result<Option<f64>, Interrupted> {
     let limit = match penalty {
-        Penalty::Barrier => SAFE * problem.longest_step(x, direction),
+        Penalty::Barrier => SAFE * problem.longest_step(x, descent.direction),
         Penalty::Regularised { .. } => f64::INFINITY,
     };
-    let start: Vec<[f64; 2]> = problem.free.iter().map(|n| x[*n as usize]).collect();
+    let start: Vec<[f64; 2]> = problem.free().iter().map(|n| x[*n as usize]).collect();
     let mut t = limit.min(1.0);
-    for _ in (0..HALVINGS).take_while(|_| problem.checkpoint().is_ok()) {
-        for (p, n) in start.iter().zip(&problem.free) {
-            let d = direction[*n as usize];
+    for _ in 0..HALVINGS {
+        problem.checkpoint()?;
+        for (p, n) in start.iter().zip(problem.free()) {
+            let d = descent.direction[*n as usize];
             x[*n as usize] = [p[0] + t * d[0], p[1] + t * d[1]];
         }
-        let reached = problem.objective(x, penalty);
-        if reached <= objective + DECREASE * t * slope && reached < objective {
-            return Some(reached);
+        let reached = problem.value(x, penalty);
+        if reached <= descent.value + DECREASE * t * descent.slope && reached < descent.value {
+            return Ok(Some(reached));
         }
         t *= 0.5;
     }
-    problem.free.iter().zip(start).for_each(|(n, p)| x[*n as usize] = p);
-    None
+    problem.free().iter().zip(start).for_each(|(n, p)| x[*n as usize] = p);
+    Ok(None)
 }

@@ -4,30 +4,31 @@
 //! more and more like the harmonic map towards the rim. Begun at the harmonic map itself, triangles with all
 //! vertices on the outer loop come to rest while they are still inverted.
 
-use super::newton::minimise;
+use super::newton::{Limits, minimise};
+use super::objective::Objective;
 use super::penalty::{Bound, Penalty};
-use super::problem::{Cell, Places, Problem};
+use super::problem::{Cell, Moved, Problem};
 use super::region;
-use super::{Effort, arc, centre_of_hole, places, terms};
-use crate::fem::bernstein::{ExactDet, Validity};
+use super::{Stats, arc, centre_of_hole, terms, uv_of};
+use crate::fem::bernstein::{JacobianBezier, Validity};
+use crate::fem::sparse;
 use crate::grid::GridPoint;
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use crate::map::quadratic::{QuadraticMap, det, invalid_triangles, node_to_grid};
-use crate::monitor::Checkpoint;
-use crate::topology::Stars;
-use crate::topology::{HalfEdgeId, VertexId};
+use crate::monitor::{Checkpoint, Interrupted};
+use crate::topology::{FaceId, HalfEdgeId, Stars, VertexId};
 
 /// Rings around invalid triangles, one attempt after another.
 const RINGS: [usize; 5] = [2, 4, 7, 12, 20];
 
 /// Patches with more triangles than this share of the chart are left to the feasible path.
-const LARGEST: f64 = 0.5;
+const MAX_SHARE: f64 = 0.5;
 
 /// Weight of the regularised penalty, relative to the area of each triangle in the plane.
 const PULL: f64 = 3e-2;
 
 /// The least width of the regularised penalty, relative to a typical jacobian.
-const NARROWEST: f64 = 1e-4;
+const MIN_WIDTH: f64 = 1e-4;
 
 /// Changes of the regularised penalty's width, and Newton steps for each.
 const ROUNDS: usize = 25;
@@ -37,48 +38,87 @@ const STEPS_PER_ROUND: usize = 4;
 const WEIGHTS: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 const STEPS_PER_WEIGHT: usize = 10;
 
-/// A weight is left when the promised decrease falls below this share of the patch's energy.
+/// A weight is left when the promised decrease falls below this share of the patch's objective.
 const TOLERANCE: f64 = 1e-10;
 
-/// Untangles patch by patch; `None` where some patch does not yield, or nobody waits any more.
-pub(super) fn untangle(
-    chart: &ClosedChart,
+/// Why patches do not lead to a valid map.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub(super) enum Stuck {
+    /// A patch would be most of the chart.
+    #[error("a patch is too large a share of the chart")]
+    TooLarge,
+    /// Some triangle stays inverted, or becomes so when it is rounded.
+    #[error("a patch stays invalid")]
+    Invalid,
+    /// Nothing in the patch may move.
+    #[error("no node of a patch may move")]
+    Fixed,
+    /// A system cannot be solved.
+    #[error(transparent)]
+    Unsolvable(#[from] sparse::Unsolvable),
+    /// The result was not wanted any more.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+impl From<sparse::Error> for Stuck {
+    fn from(error: sparse::Error) -> Self {
+        match error {
+            sparse::Error::Unsolvable(unsolvable) => Self::Unsolvable(unsolvable),
+            sparse::Error::Interrupted(interrupted) => Self::Interrupted(interrupted),
+        }
+    }
+}
+
+/// Untangles patch by patch, in growing ones.
+///
+/// # Errors
+/// [`Stuck`].
+pub(super) fn untangle<O: Objective>(
+    chart: &FilledChart,
+    objective: &O,
     start: &[GridPoint],
     harmonic: &QuadraticMap,
-    effort: &mut Effort,
+    stats: &mut Stats,
     checkpoint: &Checkpoint,
-) -> Option<Vec<GridPoint>> {
-    let setting = Setting::new(chart, start, checkpoint);
+) -> Result<Vec<GridPoint>, Stuck> {
+    let context = PatchContext::new(chart, objective, start, checkpoint);
     let mut nodes = harmonic.nodes().to_vec();
-    let mut x = harmonic.places().to_vec();
+    let mut x = harmonic.uv().to_vec();
     for rings in RINGS {
-        checkpoint.after(chart.triangles().len()).ok()?;
+        checkpoint.after(chart.triangles().len())?;
         let centres: Vec<_> = (0..chart.loops().len()).map(|k| centre_of_hole(chart, &nodes, k)).collect();
         let seeds = seeds(chart, &nodes, &centres);
         if seeds.is_empty() {
-            return Some(nodes);
+            return Ok(nodes);
         }
         let fallback = |k: usize| centres[k].unwrap_or(nodes[chart.centre_node(k)]);
         x.truncate(chart.node_count());
         x.extend((0..centres.len()).map(|k| fallback(k).uv()));
-        let patches = region::patches(chart, &setting.stars, &seeds, rings);
-        if patches.parts.iter().any(|p| p.len() as f64 > LARGEST * chart.own_triangles() as f64) {
-            return None;
+        let patches = region::patches(chart, &context.stars, &seeds, rings);
+        if patches.parts.iter().any(|p| p.len() as f64 > MAX_SHARE * chart.chart_triangles() as f64) {
+            return Err(Stuck::TooLarge);
         }
         for faces in &patches.parts {
-            checkpoint.after(faces.len()).ok()?;
+            checkpoint.after(faces.len())?;
             let weight = |v: usize| 1.5 * (1.0 - f64::from(patches.distance[v]) / rings as f64);
-            for (n, p) in setting.solve(faces, &x, weight, effort).unwrap_or_default() {
-                x[n] = p;
-                nodes[n] = node_to_grid(chart, n, p);
+            match context.solve(faces, &x, weight, stats) {
+                Ok(moved) => moved.into_iter().for_each(|Moved { node, uv }| {
+                    x[node] = uv;
+                    nodes[node] = node_to_grid(chart, node, uv);
+                }),
+                Err(Stuck::Interrupted(interrupted)) => return Err(interrupted.into()),
+                // Its triangles are seeds again, with more rings around them.
+                Err(_) => {}
             }
         }
     }
-    seeds(chart, &nodes, &vec![Some(GridPoint::default()); chart.loops().len()]).is_empty().then_some(nodes)
+    let no_centre_is_missing = vec![Some(GridPoint::default()); chart.loops().len()];
+    if seeds(chart, &nodes, &no_centre_is_missing).is_empty() { Ok(nodes) } else { Err(Stuck::Invalid) }
 }
 
 /// The triangles that must change: invalid ones, and those at arcs of holes that no point can see.
-fn seeds(chart: &ClosedChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]) -> Vec<u32> {
+fn seeds(chart: &FilledChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]) -> Vec<u32> {
     let mut seeds: Vec<u32> = invalid_triangles(chart, nodes).iter().map(|f| f.0).collect();
     for (k, hole) in chart.loops().iter().enumerate().filter(|(k, _)| centres[*k].is_none()) {
         let hidden =
@@ -91,20 +131,21 @@ fn seeds(chart: &ClosedChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]
 }
 
 /// What all patches of a chart share.
-struct Setting<'a> {
-    chart: &'a ClosedChart,
+struct PatchContext<'a, O> {
+    chart: &'a FilledChart,
+    objective: &'a O,
     stars: Stars,
     /// Per triangle, a typical jacobian: its area in space times the area scale of the linear map around it.
     density: Vec<f64>,
-    /// The raised linear map.
-    start: Places,
+    /// The degree-elevated linear map.
+    start: Vec<[f64; 2]>,
     /// Per node, whether it lies on the outer loop.
     fixed: Vec<bool>,
     checkpoint: &'a Checkpoint<'a>,
 }
 
-impl<'a> Setting<'a> {
-    fn new(chart: &'a ClosedChart, start: &[GridPoint], checkpoint: &'a Checkpoint) -> Self {
+impl<'a, O: Objective> PatchContext<'a, O> {
+    fn new(chart: &'a FilledChart, objective: &'a O, start: &[GridPoint], checkpoint: &'a Checkpoint) -> Self {
         let stars = Stars::new(chart.triangles(), chart.vertex_count());
         let in_plane = |f: usize| det(chart, start, f).coefficients().iter().sum::<f64>() / 6.0;
         let plane: Vec<f64> = (0..chart.triangles().len()).map(in_plane).collect();
@@ -116,44 +157,45 @@ impl<'a> Setting<'a> {
         };
         let density = (0..plane.len()).map(density).collect();
         let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-        Self { chart, stars, density, start: places(start, &centres), fixed: region::fixed_nodes(chart), checkpoint }
+        let (start, fixed) = (uv_of(start, &centres), chart.outer_nodes());
+        Self { chart, objective, stars, density, start, fixed, checkpoint }
     }
 
     /// Untangles one patch of the map `x` (all nodes and star centres), begun between `x` and the feasible start by
-    /// the `weight` of each vertex: the new places of the nodes that moved, or nothing where that fails.
+    /// the `weight` of each vertex: the nodes that moved.
     fn solve(
         &self,
         faces: &[u32],
         x: &[[f64; 2]],
         weight: impl Fn(usize) -> f64,
-        effort: &mut Effort,
-    ) -> Option<Vec<(usize, [f64; 2])>> {
+        stats: &mut Stats,
+    ) -> Result<Vec<Moved>, Stuck> {
         let mut problem = self.problem(faces);
         if problem.unknowns() == 0 {
-            return None;
+            return Err(Stuck::Fixed);
         }
         let mut local = problem.gather(x);
         self.blend(&mut local, &problem, faces, weight);
-        let mut spent = Effort::default();
-        let solved = relax(&mut problem, &mut local, &mut spent);
-        effort.iterations += spent.iterations;
-        solved?;
-        let mut moved: Vec<(usize, [f64; 2])> = problem.moved(&local).map(|(n, p)| (n, *p)).collect();
-        moved.sort_unstable_by_key(|m| m.0);
-        let place = |n: usize| moved.binary_search_by_key(&n, |m| m.0).map_or(x[n], |i| moved[i].1);
+        let mut spent = Stats::default();
+        let relaxed = relax(&mut problem, &mut local, &mut spent);
+        stats.iterations += spent.iterations;
+        relaxed?;
+        let mut moved: Vec<Moved> = problem.moved(&local).collect();
+        moved.sort_unstable_by_key(|m| m.node);
+        let place = |n: usize| moved.binary_search_by_key(&n, |m| m.node).map_or(x[n], |i| moved[i].uv);
         let cell = |f: &u32| self.chart.nodes(*f as usize).map(|n| node_to_grid(self.chart, n, place(n)));
-        let mut own = faces.iter().filter(|f| (**f as usize) < self.chart.own_triangles());
-        let valid = own.all(|f| ExactDet::new(cell(f)).validity() != Validity::Invalid);
-        valid.then(|| {
-            effort.decrement = effort.decrement.max(spent.decrement);
-            moved
-        })
+        let mut own = faces.iter().filter(|f| (**f as usize) < self.chart.chart_triangles());
+        if !own.all(|f| JacobianBezier::new(cell(f)).validity() != Validity::Invalid) {
+            return Err(Stuck::Invalid);
+        }
+        stats.decrement = stats.decrement.max(spent.decrement);
+        Ok(moved)
     }
 
     /// Moves free nodes towards the feasible start, by a share that `weight` gives for each vertex (cut to 0 and 1)
     /// and that mid-edge nodes take from both ends.
-    fn blend(&self, x: &mut Places, problem: &Problem, faces: &[u32], weight: impl Fn(usize) -> f64) {
-        let own = self.chart.own_vertices();
+    fn blend(&self, x: &mut [[f64; 2]], problem: &Problem<O>, faces: &[u32], weight: impl Fn(usize) -> f64) {
+        let own = self.chart.chart_vertices();
         let share = |v: VertexId| if v.index() < own { weight(v.index()).clamp(0.0, 1.0) } else { 0.0 };
         let mut shares: Vec<(usize, f64)> = Vec::with_capacity(6 * faces.len());
         for f in faces {
@@ -163,7 +205,7 @@ impl<'a> Setting<'a> {
             shares.extend((0..3).map(|k| (nodes[3 + k], 0.5 * (corner[k] + corner[(k + 1) % 3]))));
         }
         shares.sort_unstable_by_key(|s| s.0);
-        for local in &problem.free {
+        for local in problem.free() {
             let n = problem.nodes()[*local as usize] as usize;
             let found = shares.binary_search_by_key(&n, |s| s.0);
             let (share, to) = (found.map_or(0.0, |i| shares[i].1), self.start[n]);
@@ -173,14 +215,15 @@ impl<'a> Setting<'a> {
     }
 
     /// The problem on a patch: penalties on its triangles and on the arcs of holes in it.
-    fn problem(&self, faces: &[u32]) -> Problem<'a> {
-        let own = |f: u32| (f as usize) < self.chart.own_triangles();
+    fn problem(&self, faces: &[u32]) -> Problem<'a, O> {
+        let own = |f: u32| (f as usize) < self.chart.chart_triangles();
         let bound = |f: u32| {
             let density = self.density[f as usize];
-            Bound { scale: density, floor: 0.0, weight: 0.5 * density, dual: None }
+            Bound { scale: density, floor: 0.0, weight: self.objective.typical(density), dual: None }
         };
-        let cells = faces.iter().map(|f| Cell { face: *f, bounds: own(*f).then(|| [bound(*f); 6]) }).collect();
-        let mean = faces.iter().map(|f| 0.5 * self.density[*f as usize]).sum::<f64>() / faces.len() as f64;
+        let cells = faces.iter().map(|f| Cell { face: FaceId(*f), bounds: own(*f).then(|| [bound(*f); 6]) }).collect();
+        let mean =
+            faces.iter().map(|f| self.objective.typical(self.density[*f as usize])).sum::<f64>() / faces.len() as f64;
         let unset = Bound { scale: 1.0, floor: 0.0, weight: mean, dual: None };
         let mut arcs = region::arc_cells(self.chart, |h| faces.binary_search(&h.face().0).is_ok(), unset);
         let free = region::free_nodes(self.chart, &self.stars, &self.fixed, faces);
@@ -188,40 +231,40 @@ impl<'a> Setting<'a> {
             let scale = terms::arc_products(&arc.nodes.map(|n| self.start[n as usize]));
             (0..3).for_each(|k| arc.bounds[k].scale = scale[k]);
         }
-        Problem::new(self.chart, cells, arcs, &free, self.checkpoint)
+        Problem::new(self.chart, self.objective, cells, arcs, &free, self.checkpoint)
     }
 }
 
-/// Pulls a patch over to the valid side, then lets it relax towards the harmonic map; `None` where it does not yield,
-/// or its systems cannot be solved.
-fn relax(problem: &mut Problem, x: &mut Places, effort: &mut Effort) -> Option<()> {
+/// Pulls a patch over to the valid side, then lets it relax towards the harmonic map.
+fn relax<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &mut Stats) -> Result<(), Stuck> {
     let pattern = problem.pattern();
-    problem.checkpoint().ok()?;
-    let analysis = pattern.analyse().ok()?;
+    problem.checkpoint()?;
+    let analysis = pattern.analyse()?;
     problem.scale_weights(PULL);
-    let mut least = problem.least(x);
+    let mut least = problem.min_ratio(x);
     let mut eps = f64::INFINITY;
+    let limits = Limits { steps: STEPS_PER_ROUND, tolerance: TOLERANCE };
     for _ in 0..ROUNDS {
         if least > 0.0 {
             break;
         }
         // Never wider than the worst jacobian asks for, and narrower from round to round: a penalty that is too
         // wide comes to rest against the energy while triangles are still inverted.
-        eps = (0.6 * eps).min(-0.2 * least).max(NARROWEST);
-        let penalty = Penalty::Regularised { eps };
-        effort.add(minimise(problem, (&pattern, &analysis), x, penalty, (STEPS_PER_ROUND, TOLERANCE)).ok()?);
-        least = problem.least(x);
+        eps = (0.6 * eps).min(-0.2 * least).max(MIN_WIDTH);
+        stats.add(minimise(problem, &analysis, x, Penalty::Regularised { eps }, limits)?);
+        least = problem.min_ratio(x);
     }
     if least <= 0.0 {
-        return None;
+        return Err(Stuck::Invalid);
     }
     // A barrier that the point clears: a thousandth of the typical size, or half of what is there.
     problem.for_each_bound(x, |c, bound| bound.floor = (1e-3 * bound.scale).min(0.5 * c));
+    let limits = Limits { steps: STEPS_PER_WEIGHT, tolerance: TOLERANCE };
     let mut last = PULL;
     for weight in WEIGHTS {
         problem.scale_weights(weight / last);
         last = weight;
-        effort.add(minimise(problem, (&pattern, &analysis), x, Penalty::Barrier, (STEPS_PER_WEIGHT, TOLERANCE)).ok()?);
+        stats.add(minimise(problem, &analysis, x, Penalty::Barrier, limits)?);
     }
-    Some(())
+    Ok(())
 }

@@ -18,11 +18,11 @@ pub(super) enum Penalty {
 pub(super) struct Value {
     pub value: f64,
     /// Minus the slope, >= 0.
-    pub push: f64,
-    /// The force that the curvature of the coefficient is weighted with, >= 0: the slope, or its dual estimate.
-    pub force: f64,
+    pub neg_derivative: f64,
+    /// The multiplier that the curvature of the coefficient is weighted with, >= 0: the slope, or its dual estimate.
+    pub multiplier: f64,
     /// The curvature, >= 0, or its dual estimate.
-    pub bend: f64,
+    pub second_derivative: f64,
 }
 
 /// The numbers that belong to one constrained coefficient.
@@ -63,17 +63,29 @@ impl Penalty {
         match self {
             Self::Barrier if gap > 0.0 => {
                 let dual = bound.dual.unwrap_or(w / gap);
-                Value { value: -w * (gap / bound.scale).ln(), push: w / gap, force: dual, bend: dual / gap }
+                Value {
+                    value: -w * (gap / bound.scale).ln(),
+                    neg_derivative: w / gap,
+                    multiplier: dual,
+                    second_derivative: dual / gap,
+                }
             }
-            Self::Barrier => Value { value: f64::INFINITY, push: 0.0, force: 0.0, bend: 0.0 },
+            Self::Barrier => {
+                Value { value: f64::INFINITY, neg_derivative: 0.0, multiplier: 0.0, second_derivative: 0.0 }
+            }
             Self::Regularised { eps } => {
                 let d = gap / bound.scale;
                 let root = d.hypot(eps);
                 // 1 / chi without cancellation on either side of zero.
                 let inverse = if d > 0.0 { 2.0 / (d + root) } else { 2.0 * (root - d) / (eps * eps) };
                 let slope = inverse / root / bound.scale;
-                let bend = 2.0 / (root * root * root) / (bound.scale * bound.scale);
-                Value { value: w * inverse, push: w * slope, force: w * slope, bend: w * bend }
+                let second_derivative = 2.0 / (root * root * root) / (bound.scale * bound.scale);
+                Value {
+                    value: w * inverse,
+                    neg_derivative: w * slope,
+                    multiplier: w * slope,
+                    second_derivative: w * second_derivative,
+                }
             }
         }
     }
@@ -90,8 +102,11 @@ mod tests {
         for penalty in [Penalty::Barrier, Penalty::Regularised { eps: 0.1 }] {
             for c in [0.05, 0.4, 2.0] {
                 let [low, mid, high] = [c - h, c, c + h].map(|c| penalty.at(c, &bound));
-                assert!(((high.value - low.value) / (2.0 * h) + mid.push).abs() < 1e-5 * mid.push);
-                assert!(((low.push - high.push) / (2.0 * h) - mid.bend).abs() < 1e-5 * mid.bend);
+                assert!(((high.value - low.value) / (2.0 * h) + mid.neg_derivative).abs() < 1e-5 * mid.neg_derivative);
+                assert!(
+                    ((low.neg_derivative - high.neg_derivative) / (2.0 * h) - mid.second_derivative).abs()
+                        < 1e-5 * mid.second_derivative
+                );
             }
         }
     }
@@ -117,7 +132,7 @@ mod tests {
         let bound = Bound { scale: 1.0, floor: 0.0, weight: 1.0, dual: None };
         let penalty = Penalty::Regularised { eps: 1e-3 };
         let values: Vec<_> = (-50..50).map(|i| penalty.at(f64::from(i) * 1e-4, &bound)).collect();
-        assert!(values.windows(2).all(|w| w[0].value > w[1].value && w[0].push > w[1].push));
+        assert!(values.windows(2).all(|w| w[0].value > w[1].value && w[0].neg_derivative > w[1].neg_derivative));
         assert_eq!(Penalty::Barrier.at(0.0, &bound).value, f64::INFINITY);
     }
 }

@@ -1,22 +1,26 @@
-//! The optimisation problem on a region of a chart: Dirichlet energy plus penalties, over the nodes that may move.
+//! The optimisation problem on a region of a chart: an objective plus penalties, over the nodes that may move.
 
+use super::objective::{LocalModel, Objective, SCALARS};
 use super::penalty::{Bound, Penalty, Value};
-use super::terms::{self, Form, Four};
-use crate::fem::element;
-use crate::fem::jacobian::{Corners, Six};
-use crate::fem::sparse::{Analysis, Error, PRESCRIBED, Pattern};
-use crate::map::closed::ClosedChart;
+use super::terms::{self, ArcNodes};
+use crate::fem::dofs::Dofs;
+use crate::fem::jacobian::{CornerDerivatives, P2Nodes};
+use crate::fem::sparse::{Analysis, Error, PRESCRIBED, Pattern, Unsolvable};
+use crate::map::filled::FilledChart;
 use crate::monitor::{Checkpoint, Interrupted};
+use crate::topology::FaceId;
 
 /// The work of a triangle: as long as so many are looked at elsewhere.
 const WORK_PER_CELL: usize = 4;
 
-/// Places of nodes.
-pub(super) type Places = Vec<[f64; 2]>;
+/// Where rounding makes a Hessian singular its diagonal is raised by this share, then by a hundred times as much, and so
+/// on, up to the largest. Between what rounding does and what would be felt; chosen by experience.
+const FIRST_SHIFT: f64 = 1e-12;
+const LAST_SHIFT: f64 = 1e-2;
 
 /// A triangle of the region, with penalties on its six coefficients (none on virtual fans).
 pub(super) struct Cell {
-    pub face: u32,
+    pub face: FaceId,
     pub bounds: Option<[Bound; 6]>,
 }
 
@@ -26,10 +30,11 @@ pub(super) struct ArcCell {
     pub bounds: [Bound; 3],
 }
 
-/// The part of a chart in which nodes may move, and the penalties that hold there. Its nodes have numbers of their
-/// own, so that a small region costs little, however large the chart is.
-pub(super) struct Problem<'a> {
-    chart: &'a ClosedChart,
+/// The part of a chart in which nodes may move, the objective, and the penalties that hold there. Its nodes have
+/// numbers of their own, so that a small region costs little, however large the chart is.
+pub(super) struct Problem<'a, O> {
+    chart: &'a FilledChart,
+    objective: &'a O,
     checkpoint: &'a Checkpoint<'a>,
     pub cells: Vec<Cell>,
     pub arcs: Vec<ArcCell>,
@@ -37,39 +42,43 @@ pub(super) struct Problem<'a> {
     nodes: Vec<u32>,
     /// Per cell, its six nodes in the numbering of the region.
     of_cell: Vec<[u32; 6]>,
-    /// The nodes that may move, in the numbering of the region.
-    pub free: Vec<u32>,
-    /// Per node of the region, its place among `free`, or [`PRESCRIBED`].
-    number: Vec<u32>,
+    /// The nodes of the region that may move.
+    dofs: Dofs,
 }
 
-/// Slope and curvature of the objective at a point.
+/// Slope and curvature of objective and penalties at a point.
 pub(super) struct Model {
     pub gradient: Vec<f64>,
     pub hessian: Vec<f64>,
 }
 
-impl<'a> Problem<'a> {
+/// A node that moved, in the numbering of the chart, and where it is now.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moved {
+    pub node: usize,
+    pub uv: [f64; 2],
+}
+
+impl<'a, O: Objective> Problem<'a, O> {
     /// The problem on `cells` and `arcs`, of whose nodes those in `free` may move; nodes as numbered in the chart,
     /// star centres after all others.
     pub fn new(
-        chart: &'a ClosedChart,
+        chart: &'a FilledChart,
+        objective: &'a O,
         cells: Vec<Cell>,
         mut arcs: Vec<ArcCell>,
         free: &[u32],
         checkpoint: &'a Checkpoint,
     ) -> Self {
-        let six = |cell: &Cell| chart.nodes(cell.face as usize).map(|n| n as u32);
-        let mut nodes: Vec<u32> = cells.iter().flat_map(six).chain(arcs.iter().flat_map(|a| a.nodes)).collect();
+        let of_chart = |cell: &Cell| chart.nodes(cell.face.index()).map(|n| n as u32);
+        let mut nodes: Vec<u32> = cells.iter().flat_map(of_chart).chain(arcs.iter().flat_map(|a| a.nodes)).collect();
         nodes.sort_unstable();
         nodes.dedup();
         let local = |n: u32| nodes.partition_point(|m| *m < n) as u32;
-        let of_cell = cells.iter().map(|c| six(c).map(local)).collect();
+        let of_cell = cells.iter().map(|c| of_chart(c).map(local)).collect();
         arcs.iter_mut().for_each(|a| a.nodes = a.nodes.map(local));
-        let free: Vec<u32> = free.iter().map(|n| local(*n)).collect();
-        let mut number = vec![PRESCRIBED; nodes.len()];
-        free.iter().enumerate().for_each(|(i, n)| number[*n as usize] = i as u32);
-        Self { chart, checkpoint, cells, arcs, nodes, of_cell, free, number }
+        let dofs = Dofs::new(nodes.len(), free.iter().map(|n| local(*n)).collect());
+        Self { chart, objective, checkpoint, cells, arcs, nodes, of_cell, dofs }
     }
 
     /// A safe point, after all triangles of the region were looked at.
@@ -82,168 +91,168 @@ impl<'a> Problem<'a> {
         &self.nodes
     }
 
-    /// The places of the region's nodes, out of those of the whole chart.
-    pub fn gather(&self, all: &[[f64; 2]]) -> Places {
+    /// The uv_of of the region's nodes, out of those of the whole chart.
+    pub fn gather(&self, all: &[[f64; 2]]) -> Vec<[f64; 2]> {
         self.nodes.iter().map(|n| all[*n as usize]).collect()
     }
 
+    /// The nodes that may move, in the numbering of the region.
+    pub fn free(&self) -> &[u32] {
+        self.dofs.free()
+    }
+
     /// The nodes that may move, as numbered in the chart, each with its place in `x`.
-    pub fn moved<'x>(&self, x: &'x Places) -> impl Iterator<Item = (usize, &'x [f64; 2])> {
-        self.free.iter().map(|n| (self.nodes[*n as usize] as usize, &x[*n as usize]))
+    pub fn moved(&self, x: &[[f64; 2]]) -> impl Iterator<Item = Moved> {
+        self.free().iter().map(|n| Moved { node: self.nodes[*n as usize] as usize, uv: x[*n as usize] })
     }
 
     /// The number of scalar unknowns: two per free node.
     pub fn unknowns(&self) -> usize {
-        2 * self.free.len()
+        2 * self.dofs.count()
     }
 
     /// The pattern of the Hessian: first the triangles, then the arcs (padded to the same size).
     pub fn pattern(&self) -> Pattern {
-        let pair = |n: usize| match self.number[n] {
-            PRESCRIBED => [PRESCRIBED; 2],
-            i => [2 * i, 2 * i + 1],
-        };
-        let mut elements: Vec<[u32; 12]> = Vec::with_capacity(self.cells.len() + self.arcs.len());
-        for nodes in &self.of_cell {
-            elements.push(std::array::from_fn(|i| pair(nodes[i / 2] as usize)[i % 2]));
-        }
-        for arc in &self.arcs {
-            elements
-                .push(std::array::from_fn(|i| arc.nodes.get(i / 2).map_or(PRESCRIBED, |n| pair(*n as usize)[i % 2])));
-        }
+        let of_cells = self.of_cell.iter().map(|nodes| self.components(nodes));
+        let of_arcs = self.arcs.iter().map(|arc| self.components(&arc.nodes));
+        let elements: Vec<[u32; SCALARS]> = of_cells.chain(of_arcs).collect();
         Pattern::new(self.unknowns(), &elements)
     }
 
-    /// The energy of the region plus all penalties.
-    pub fn objective(&self, x: &Places, penalty: Penalty) -> f64 {
+    /// The scalar unknowns of up to six nodes, padded with [`PRESCRIBED`].
+    fn components(&self, nodes: &[u32]) -> [u32; SCALARS] {
+        let component = |i: usize| nodes.get(i / 2).map_or(PRESCRIBED, |n| self.dofs.component(*n as usize, i % 2));
+        std::array::from_fn(component)
+    }
+
+    /// The objective over the region plus all penalties.
+    pub fn value(&self, x: &[[f64; 2]], penalty: Penalty) -> f64 {
         let mut total = 0.0;
         for (i, cell) in self.cells.iter().enumerate() {
-            let six = self.six(i, x);
-            total += element::energy(&element::stiffness(&self.chart.shapes()[cell.face as usize]), &six);
+            let uv = self.cell_uv(i, x);
+            total += self.objective.value(cell.face, &uv);
             if let Some(bounds) = &cell.bounds {
-                let dets = Corners::new(&six).dets();
+                let dets = CornerDerivatives::new(&uv).dets();
                 total += (0..6).map(|k| penalty.at(dets[k], &bounds[k]).value).sum::<f64>();
             }
         }
         for arc in &self.arcs {
-            let products = terms::arc_products(&four(arc, x));
+            let products = terms::arc_products(&arc_uv(arc, x));
             total += (0..3).map(|k| penalty.at(products[k], &arc.bounds[k]).value).sum::<f64>();
         }
         total
     }
 
-    fn six(&self, cell: usize, x: &Places) -> Six {
+    fn cell_uv(&self, cell: usize, x: &[[f64; 2]]) -> P2Nodes {
         self.of_cell[cell].map(|n| x[n as usize])
     }
 
     /// Gradient and (positive) Hessian at `x`.
-    pub fn model(&self, x: &Places, penalty: Penalty, pattern: &Pattern) -> Model {
+    pub fn model(&self, x: &[[f64; 2]], penalty: Penalty, pattern: &Pattern) -> Model {
         let mut model = Model { gradient: vec![0.0; self.unknowns()], hessian: pattern.zeros() };
         for (i, cell) in self.cells.iter().enumerate() {
-            let six = self.six(i, x);
-            let shape = &self.chart.shapes()[cell.face as usize];
-            let stiffness = element::stiffness(shape);
-            let mut gradient = energy_gradient(&stiffness, &six);
-            let mut form = Form::of_stiffness(stiffness);
-            let mut outer = Vec::with_capacity(6);
+            let uv = self.cell_uv(i, x);
+            let mut local = self.objective.model(cell.face, &uv);
             if let Some(bounds) = &cell.bounds {
-                let corners = Corners::new(&six);
+                let corners = CornerDerivatives::new(&uv);
                 let dets = corners.dets();
                 let values: [Value; 6] = std::array::from_fn(|k| penalty.at(dets[k], &bounds[k]));
-                form.add_curvature(shape, &values.map(|v| v.force));
-                outer.extend((0..6).map(|k| (values[k], corners.gradient(k))));
+                let shape = &self.chart.shapes()[cell.face.index()];
+                terms::add_curvature(&mut local.hessian, shape, &values.map(|v| v.multiplier));
+                for (k, value) in values.iter().enumerate() {
+                    add_outer(&mut local, value, &corners.gradient(k));
+                }
             }
-            let mut hessian = form.matrix();
-            add_outer(&mut gradient, &mut hessian, &outer);
-            pattern.add(&mut model.hessian, i, &hessian);
-            self.scatter(&mut model.gradient, &self.of_cell[i], &gradient);
+            pattern.add(&mut model.hessian, i, &local.hessian);
+            self.scatter(&mut model.gradient, &self.of_cell[i], &local.gradient);
         }
         for (i, arc) in self.arcs.iter().enumerate() {
-            let places = four(arc, x);
-            let products = terms::arc_products(&places);
-            let (mut gradient, mut hessian) = ([0.0; 12], [[0.0; 12]; 12]);
-            let outer: Vec<_> = (0..3)
-                .map(|k| (penalty.at(products[k], &arc.bounds[k]), padded(terms::arc_gradient(&places, k))))
-                .collect();
-            add_outer(&mut gradient, &mut hessian, &outer);
-            pattern.add(&mut model.hessian, self.cells.len() + i, &hessian);
-            self.scatter(&mut model.gradient, &arc.nodes, &gradient);
+            let uv_of = arc_uv(arc, x);
+            let products = terms::arc_products(&uv_of);
+            let mut local = LocalModel { gradient: [0.0; SCALARS], hessian: [[0.0; SCALARS]; SCALARS] };
+            for k in 0..3 {
+                let value = penalty.at(products[k], &arc.bounds[k]);
+                add_outer(&mut local, &value, &padded(terms::arc_gradient(&uv_of, k)));
+            }
+            pattern.add(&mut model.hessian, self.cells.len() + i, &local.hessian);
+            self.scatter(&mut model.gradient, &arc.nodes, &local.gradient);
         }
         model
     }
 
-    fn scatter(&self, gradient: &mut [f64], nodes: &[u32], element: &[f64; 12]) {
+    fn scatter(&self, gradient: &mut [f64], nodes: &[u32], element: &[f64; SCALARS]) {
         for (i, n) in nodes.iter().enumerate() {
-            let number = self.number[*n as usize];
-            if number != PRESCRIBED {
-                gradient[2 * number as usize] += element[2 * i];
-                gradient[2 * number as usize + 1] += element[2 * i + 1];
+            if let Some(unknown) = self.dofs.unknown(*n as usize) {
+                gradient[2 * unknown] += element[2 * i];
+                gradient[2 * unknown + 1] += element[2 * i + 1];
             }
         }
     }
 
     /// The direction that belongs to a step of the unknowns: zero at nodes that may not move.
-    pub fn direction(&self, step: &[f64]) -> Places {
-        let mut direction = vec![[0.0; 2]; self.number.len()];
-        for (i, n) in self.free.iter().enumerate() {
+    pub fn direction(&self, step: &[f64]) -> Vec<[f64; 2]> {
+        let mut direction = vec![[0.0; 2]; self.dofs.nodes()];
+        for (i, n) in self.free().iter().enumerate() {
             direction[*n as usize] = [step[2 * i], step[2 * i + 1]];
         }
         direction
     }
 
     /// The largest t at which no penalised quantity of `x + t direction` has fallen to its floor yet.
-    pub fn longest_step(&self, x: &Places, direction: &Places) -> f64 {
+    pub fn longest_step(&self, x: &[[f64; 2]], direction: &[[f64; 2]]) -> f64 {
         let mut longest = f64::INFINITY;
         let mut meet = |c0: f64, c1: f64, c2: f64| longest = longest.min(terms::first_zero(c0, c1, c2));
         for (i, cell) in self.cells.iter().enumerate() {
             let Some(bounds) = &cell.bounds else { continue };
-            let (at, along) = (Corners::new(&self.six(i, x)), Corners::new(&self.six(i, direction)));
-            let (c0, c1, c2) = (at.dets(), at.mixed(&along), along.dets());
+            let (at, along) =
+                (CornerDerivatives::new(&self.cell_uv(i, x)), CornerDerivatives::new(&self.cell_uv(i, direction)));
+            let (c0, c1, c2) = (at.dets(), at.polarization(&along), along.dets());
             (0..6).for_each(|k| meet(c0[k] - bounds[k].floor, c1[k], c2[k]));
         }
         for arc in &self.arcs {
-            let (at, along) = (four(arc, x), four(arc, direction));
-            let (c0, c1, c2) = (terms::arc_products(&at), terms::arc_mixed(&at, &along), terms::arc_products(&along));
+            let (at, along) = (arc_uv(arc, x), arc_uv(arc, direction));
+            let (c0, c1, c2) =
+                (terms::arc_products(&at), terms::arc_polarization(&at, &along), terms::arc_products(&along));
             (0..3).for_each(|k| meet(c0[k] - arc.bounds[k].floor, c1[k], c2[k]));
         }
         longest
     }
 
     /// Calls `visit` with every penalised quantity and its bound.
-    pub fn for_each_bound(&mut self, x: &Places, mut visit: impl FnMut(f64, &mut Bound)) {
+    pub fn for_each_bound(&mut self, x: &[[f64; 2]], mut visit: impl FnMut(f64, &mut Bound)) {
         for i in 0..self.cells.len() {
-            let dets = Corners::new(&self.six(i, x)).dets();
+            let dets = CornerDerivatives::new(&self.cell_uv(i, x)).dets();
             if let Some(bounds) = &mut self.cells[i].bounds {
                 (0..6).for_each(|k| visit(dets[k], &mut bounds[k]));
             }
         }
         for arc in &mut self.arcs {
-            let products = terms::arc_products(&four(arc, x));
+            let products = terms::arc_products(&arc_uv(arc, x));
             (0..3).for_each(|k| visit(products[k], &mut arc.bounds[k]));
         }
     }
 
     /// Updates the dual variables of a barrier after the step from `from` to `to`, of which `direction` is the full
     /// length.
-    pub fn update_duals(&mut self, from: &Places, direction: &Places, to: &Places) {
+    pub fn update_duals(&mut self, from: &[[f64; 2]], direction: &[[f64; 2]], to: &[[f64; 2]]) {
         for i in 0..self.cells.len() {
             if self.cells[i].bounds.is_none() {
                 continue;
             }
-            let [x, d, y] = [from, direction, to].map(|p| Corners::new(&self.six(i, p)));
-            let (c, change, new) = (x.dets(), x.mixed(&d), y.dets());
+            let [x, d, y] = [from, direction, to].map(|p| CornerDerivatives::new(&self.cell_uv(i, p)));
+            let (c, change, new) = (x.dets(), x.polarization(&d), y.dets());
             let bounds = self.cells[i].bounds.iter_mut().flatten();
             bounds.enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));
         }
         for arc in &mut self.arcs {
-            let [x, d, y] = [from, direction, to].map(|p| four(arc, p));
-            let (c, change, new) = (terms::arc_products(&x), terms::arc_mixed(&x, &d), terms::arc_products(&y));
+            let [x, d, y] = [from, direction, to].map(|p| arc_uv(arc, p));
+            let (c, change, new) = (terms::arc_products(&x), terms::arc_polarization(&x, &d), terms::arc_products(&y));
             arc.bounds.iter_mut().enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));
         }
     }
 
     /// The least penalised quantity, relative to its scale.
-    pub fn least(&mut self, x: &Places) -> f64 {
+    pub fn min_ratio(&mut self, x: &[[f64; 2]]) -> f64 {
         let mut least = f64::INFINITY;
         self.for_each_bound(x, |c, bound| least = least.min((c - bound.floor) / bound.scale));
         least
@@ -254,54 +263,45 @@ impl<'a> Problem<'a> {
         let bounds = self.cells.iter_mut().filter_map(|c| c.bounds.as_mut()).flatten();
         bounds.chain(self.arcs.iter_mut().flat_map(|a| &mut a.bounds)).for_each(|b| b.weight *= factor);
     }
-}
 
-fn four(arc: &ArcCell, x: &Places) -> Four {
-    arc.nodes.map(|n| x[n as usize])
-}
-
-fn padded(g: [f64; 8]) -> [f64; 12] {
-    std::array::from_fn(|i| if i < 8 { g[i] } else { 0.0 })
-}
-
-/// The gradient of the Dirichlet energy of a triangle.
-fn energy_gradient(stiffness: &[[f64; 6]; 6], x: &Six) -> [f64; 12] {
-    let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
-    std::array::from_fn(|i| (0..6).map(|n| stiffness[i / 2][n] * d[n][i % 2]).sum())
-}
-
-/// Adds slopes and curvatures of penalties with these gradients.
-fn add_outer(gradient: &mut [f64; 12], hessian: &mut [[f64; 12]; 12], terms: &[(Value, [f64; 12])]) {
-    for (value, g) in terms {
-        for i in 0..12 {
-            gradient[i] -= value.push * g[i];
-            for j in 0..=i {
-                hessian[i][j] += value.bend * g[i] * g[j];
+    /// Newton's step: minus the inverse Hessian times the gradient. Where rounding makes the Hessian singular its
+    /// diagonal is raised, a hundredfold at a time.
+    ///
+    /// # Errors
+    /// Those of [`Analysis::factorise`].
+    pub fn newton_step(&self, analysis: &Analysis, model: &mut Model) -> Result<Vec<f64>, Error> {
+        let mut shift = FIRST_SHIFT;
+        loop {
+            match analysis.factorise(&model.hessian, self.checkpoint.monitor) {
+                Ok(factor) => {
+                    let mut step: Vec<f64> = model.gradient.iter().map(|g| -g).collect();
+                    factor.solve(&mut step, 1);
+                    return Ok(step);
+                }
+                Err(Error::Unsolvable(Unsolvable::Singular { .. })) if shift < LAST_SHIFT => {
+                    analysis.pattern().diagonal().for_each(|d| model.hessian[d] *= 1.0 + shift);
+                    shift *= 100.0;
+                }
+                Err(error) => return Err(error),
             }
         }
     }
 }
 
-/// Newton's step: minus the inverse Hessian times the gradient. Where rounding makes the Hessian singular its
-/// diagonal is raised, a hundredfold at a time.
-pub(super) fn newton_step(
-    problem: &Problem,
-    (pattern, analysis): (&Pattern, &Analysis),
-    model: &mut Model,
-) -> Result<Vec<f64>, Error> {
-    let mut shift = 1e-12;
-    loop {
-        match analysis.factorise(&model.hessian, problem.checkpoint.monitor) {
-            Ok(factor) => {
-                let mut step: Vec<f64> = model.gradient.iter().map(|g| -g).collect();
-                factor.solve(&mut step, 1);
-                return Ok(step);
-            }
-            Err(Error::Singular { .. }) if shift < 1e-2 => {
-                pattern.diagonal().for_each(|d| model.hessian[d] *= 1.0 + shift);
-                shift *= 100.0;
-            }
-            Err(error) => return Err(error),
+fn arc_uv(arc: &ArcCell, x: &[[f64; 2]]) -> ArcNodes {
+    arc.nodes.map(|n| x[n as usize])
+}
+
+fn padded(g: [f64; 8]) -> [f64; SCALARS] {
+    std::array::from_fn(|i| if i < 8 { g[i] } else { 0.0 })
+}
+
+/// Adds slope and curvature of a penalty on a quantity with this gradient.
+fn add_outer(local: &mut LocalModel, value: &Value, gradient: &[f64; SCALARS]) {
+    for i in 0..SCALARS {
+        local.gradient[i] -= value.neg_derivative * gradient[i];
+        for j in 0..=i {
+            local.hessian[i][j] += value.second_derivative * gradient[i] * gradient[j];
         }
     }
 }

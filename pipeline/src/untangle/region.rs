@@ -2,7 +2,7 @@
 
 use super::penalty::Bound;
 use super::problem::ArcCell;
-use crate::map::closed::ClosedChart;
+use crate::map::filled::FilledChart;
 use crate::topology::HalfEdgeId;
 use crate::topology::Stars;
 use crate::topology::union_find::UnionFind;
@@ -17,13 +17,13 @@ pub(super) struct Patches {
 
 /// The triangles within `rings` rings of the seeds. Rings grow through vertices of the chart, not through the
 /// centres of fans.
-pub(super) fn patches(chart: &ClosedChart, stars: &Stars, seeds: &[u32], rings: usize) -> Patches {
+pub(super) fn patches(chart: &FilledChart, stars: &Stars, seeds: &[u32], rings: usize) -> Patches {
     let mut inside = vec![false; chart.triangles().len()];
-    let mut distance = vec![rings as u32; chart.own_vertices()];
+    let mut distance = vec![rings as u32; chart.chart_vertices()];
     let mut front: Vec<u32> = seeds.to_vec();
     seeds.iter().for_each(|f| inside[*f as usize] = true);
     let mut all = front.clone();
-    let own = chart.own_vertices();
+    let own = chart.chart_vertices();
     for ring in 0..rings as u32 {
         let mut next = Vec::new();
         let vertices = front.iter().flat_map(|f| chart.triangles()[*f as usize]).filter(|v| v.index() < own);
@@ -43,7 +43,7 @@ pub(super) fn patches(chart: &ClosedChart, stars: &Stars, seeds: &[u32], rings: 
     Patches { parts: components(chart, all), distance }
 }
 
-fn components(chart: &ClosedChart, faces: Vec<u32>) -> Vec<Vec<u32>> {
+fn components(chart: &FilledChart, faces: Vec<u32>) -> Vec<Vec<u32>> {
     let mut sets = UnionFind::new(chart.vertex_count());
     for f in &faces {
         let [a, b, c] = chart.triangles()[*f as usize].map(|v| v.index());
@@ -56,19 +56,9 @@ fn components(chart: &ClosedChart, faces: Vec<u32>) -> Vec<Vec<u32>> {
     keyed.chunk_by(|a, b| a.0 == b.0).map(|part| part.iter().map(|k| k.1).collect()).collect()
 }
 
-/// Per node of the closed chart, whether it lies on the outer loop, where nothing moves.
-pub(super) fn fixed_nodes(chart: &ClosedChart) -> Vec<bool> {
-    let mut fixed = vec![false; chart.node_count()];
-    for h in chart.outer() {
-        fixed[chart.vertex_node(chart.ends(*h)[0])] = true;
-        fixed[chart.mid_node(*h)] = true;
-    }
-    fixed
-}
-
 /// The nodes that may move when only `faces` (ascending) may change: all of their triangles are among them, and
 /// they are not `fixed`.
-pub(super) fn free_nodes(chart: &ClosedChart, stars: &Stars, fixed: &[bool], faces: &[u32]) -> Vec<u32> {
+pub(super) fn free_nodes(chart: &FilledChart, stars: &Stars, fixed: &[bool], faces: &[u32]) -> Vec<u32> {
     let among = |f: u32| faces.binary_search(&f).is_ok();
     let mut free = Vec::new();
     for &f in faces {
@@ -90,7 +80,7 @@ pub(super) fn free_nodes(chart: &ClosedChart, stars: &Stars, fixed: &[bool], fac
 }
 
 /// The arcs of all holes whose half-edges `wanted` picks, with their star centres, all with the bound `unset`.
-pub(super) fn arc_cells(chart: &ClosedChart, wanted: impl Fn(HalfEdgeId) -> bool, unset: Bound) -> Vec<ArcCell> {
+pub(super) fn arc_cells(chart: &FilledChart, wanted: impl Fn(HalfEdgeId) -> bool, unset: Bound) -> Vec<ArcCell> {
     let cell = |k: usize, h: HalfEdgeId| {
         let [from, to] = chart.ends(h).map(|v| chart.vertex_node(v) as u32);
         let centre = (chart.node_count() + k) as u32;

@@ -1,25 +1,30 @@
 use super::*;
+use crate::fem::jacobian::P2Nodes;
 use crate::map::boundary::{Boundary, Mids};
-use crate::map::linear::{linear_map, lower_ears};
-use crate::map::quadratic::quadratic_map;
+use crate::map::linear::{flatten_ear_arcs, linear_map};
+use crate::map::quadratic::{energy, quadratic_map};
 use crate::mesh::TriangleSoup;
 use crate::monitor::NoMonitor;
 use crate::{decompose, repair, shapes};
 
 /// A chart with its feasible start and its harmonic map.
-fn prepared(soup: &TriangleSoup) -> (ClosedChart, Vec<GridPoint>, QuadraticMap) {
+fn prepared(soup: &TriangleSoup) -> (FilledChart, Vec<GridPoint>, QuadraticMap) {
     let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
     let chart =
-        ClosedChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
+        FilledChart::new(&decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0]);
     let mut boundary = Boundary::circle(&chart, Mids::Arc);
     let linear = linear_map(&chart, &boundary, &NoMonitor).expect("maps");
-    lower_ears(&chart, &linear, &mut boundary);
+    flatten_ear_arcs(&chart, &linear, &mut boundary);
     let harmonic = quadratic_map(&chart, &boundary, &NoMonitor).expect("solves");
-    let start = linear.raised(&chart, &boundary);
+    let start = linear.degree_elevated(&chart, &boundary);
     (chart, start, harmonic)
 }
 
-fn check(chart: &ClosedChart, untangled: &Untangled) {
+fn untangled(chart: &FilledChart, start: &[GridPoint], harmonic: &QuadraticMap) -> Untangled {
+    untangle(chart, &Dirichlet::new(chart.shapes()), start, harmonic, &NoMonitor).expect("nobody interrupts")
+}
+
+fn check(chart: &FilledChart, untangled: &Untangled) {
     assert!(valid(chart, &untangled.nodes).is_some());
     let report = &untangled.report;
     assert!(report.energy >= report.energy_harmonic * (1.0 - 1e-12), "{report:?}");
@@ -30,7 +35,7 @@ fn check(chart: &ClosedChart, untangled: &Untangled) {
 fn a_valid_harmonic_map_is_left_alone() {
     let (chart, start, harmonic) = prepared(&shapes::disk(8));
     assert!(harmonic.invalid().is_empty());
-    let got = untangle(&chart, &start, &harmonic, &NoMonitor);
+    let got = untangled(&chart, &start, &harmonic);
     assert_eq!((got.report.method, got.report.nodes_moved), (Method::Harmonic, 0));
 }
 
@@ -39,7 +44,7 @@ fn the_small_examples_are_untangled() {
     for soup in [shapes::folding_three(), shapes::folding_six()] {
         let (chart, start, harmonic) = prepared(&soup);
         assert!(!harmonic.invalid().is_empty());
-        let got = untangle(&chart, &start, &harmonic, &NoMonitor);
+        let got = untangled(&chart, &start, &harmonic);
         assert_eq!(got.report.method, Method::Feasible, "a third of the triangles is invalid");
         check(&chart, &got);
     }
@@ -49,11 +54,14 @@ fn the_small_examples_are_untangled() {
 fn a_bent_disk_is_untangled_close_to_the_harmonic_map_on_both_paths() {
     let (chart, start, harmonic) = prepared(&shapes::bent_disk(32, 0.45, 1.0));
     assert!(harmonic.invalid().len() > 150, "{} invalid", harmonic.invalid().len());
-    let got = untangle(&chart, &start, &harmonic, &NoMonitor);
+    let got = untangled(&chart, &start, &harmonic);
     assert_eq!(got.report.method, Method::Patch);
     check(&chart, &got);
-    let mut effort = Effort::default();
-    let nodes = feasible::untangle(&chart, &start, &mut effort, &Checkpoint::new(&NoMonitor)).expect("small");
+    let mut stats = Stats::default();
+    let nodes = {
+        let energy = Dirichlet::new(chart.shapes());
+        feasible::untangle(&chart, &energy, &start, &mut stats, &Checkpoint::new(&NoMonitor)).expect("small")
+    };
     assert!(valid(&chart, &nodes).is_some());
     // Patches alone come as close to the lower bound as the whole chart does.
     for energy in [got.report.energy, energy(&chart, &nodes)] {
@@ -64,7 +72,112 @@ fn a_bent_disk_is_untangled_close_to_the_harmonic_map_on_both_paths() {
 #[test]
 fn the_harmonic_energy_is_a_lower_bound_even_where_the_map_leaves_the_disk_far_behind() {
     let (chart, start, harmonic) = prepared(&shapes::bent_disk(8, 0.45, 10.0));
-    let farthest = harmonic.places().iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let farthest = harmonic.uv().iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
     assert!(farthest > 2.0, "beyond the grid: {farthest}");
-    check(&chart, &untangle(&chart, &start, &harmonic, &NoMonitor));
+    check(&chart, &untangled(&chart, &start, &harmonic));
+}
+
+/// Half the squared distance of the nodes of each triangle to those of a given map.
+struct Distance<'a> {
+    chart: &'a FilledChart,
+    target: Vec<[f64; 2]>,
+}
+
+impl Distance<'_> {
+    fn offsets(&self, face: FaceId, x: &P2Nodes) -> [f64; objective::SCALARS] {
+        let target = self.chart.nodes(face.index()).map(|n| self.target[n]);
+        std::array::from_fn(|i| x[i / 2][i % 2] - target[i / 2][i % 2])
+    }
+}
+
+impl Objective for Distance<'_> {
+    fn value(&self, face: FaceId, x: &P2Nodes) -> f64 {
+        0.5 * self.offsets(face, x).iter().map(|d| d * d).sum::<f64>()
+    }
+
+    fn model(&self, face: FaceId, x: &P2Nodes) -> LocalModel {
+        let mut hessian = [[0.0; objective::SCALARS]; objective::SCALARS];
+        (0..objective::SCALARS).for_each(|i| hessian[i][i] = 1.0);
+        LocalModel { gradient: self.offsets(face, x), hessian }
+    }
+
+    fn typical(&self, area: f64) -> f64 {
+        area
+    }
+}
+
+#[test]
+fn the_distance_to_a_map_is_a_model_of_itself() {
+    let (chart, start, _) = prepared(&shapes::disk(3));
+    objective::tests::check_derivatives(&Distance { chart: &chart, target: uv_of(&start, &[]) });
+}
+
+#[test]
+fn another_objective_finds_the_closest_valid_map() {
+    let (chart, start, harmonic) = prepared(&shapes::folding_six());
+    assert!(!harmonic.invalid().is_empty(), "the target is beyond the valid maps");
+    let distance = Distance { chart: &chart, target: harmonic.uv().to_vec() };
+    let got = untangle(&chart, &distance, &start, &harmonic, &NoMonitor).expect("nobody interrupts");
+    assert!(valid(&chart, &got.nodes).is_some());
+    assert_eq!((got.report.method, got.report.energy_harmonic), (Method::Feasible, 0.0));
+    assert!(0.0 < got.report.energy && got.report.energy < 0.5 * got.report.energy_start, "{:?}", got.report);
+    // No valid map within reach of one moved node is closer by more than the barrier's weight.
+    let is_outer = chart.outer_nodes();
+    let step = 1e-4;
+    for node in (0..chart.node_count()).filter(|n| !is_outer[*n]) {
+        for direction in [[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]] {
+            let mut moved = uv_of(&got.nodes, &[]);
+            (0..2).for_each(|k| moved[node][k] += direction[k]);
+            let on_grid = on_grid(&chart, &moved);
+            let closer = got.report.energy - total(&chart, &distance, &moved);
+            assert!(closer < 1e-5 || valid(&chart, &on_grid).is_none(), "node {node}: closer by {closer}");
+        }
+    }
+}
+
+#[test]
+fn a_valid_target_is_reached() {
+    let (chart, start, harmonic) = prepared(&shapes::disk(4));
+    assert!(harmonic.invalid().is_empty());
+    let distance = Distance { chart: &chart, target: harmonic.uv().to_vec() };
+    let (mut stats, checkpoint) = (Stats::default(), Checkpoint::new(&NoMonitor));
+    let nodes = feasible::untangle(&chart, &distance, &start, &mut stats, &checkpoint).expect("small");
+    let [before, after] = [&start, &nodes].map(|n| total_on_grid(&chart, &distance, n));
+    assert!(after < 1e-9 * before, "{before} {after}");
+}
+
+#[test]
+fn interrupted_at_any_time_there_is_no_result() {
+    let (chart, start, harmonic) = prepared(&shapes::bent_disk(16, 0.45, 1.0));
+    let energy = Dirichlet::new(chart.shapes());
+    let patient = CountDown::new(usize::MAX);
+    untangle(&chart, &energy, &start, &harmonic, &patient).expect("nobody interrupts");
+    let asked = usize::MAX - patient.left.into_inner();
+    assert!(asked > 3, "{asked}");
+    for patience in [0, 1, asked / 2, asked - 1] {
+        let got = untangle(&chart, &energy, &start, &harmonic, &CountDown::new(patience));
+        assert!(got.is_err(), "after {patience} of {asked} answers");
+    }
+}
+
+/// A monitor that says yes so many times.
+struct CountDown {
+    left: std::sync::atomic::AtomicUsize,
+}
+
+impl CountDown {
+    fn new(patience: usize) -> Self {
+        Self { left: patience.into() }
+    }
+}
+
+impl Monitor for CountDown {
+    fn should_continue(&self) -> bool {
+        use std::sync::atomic::Ordering::Relaxed;
+        self.left.fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1)).is_ok()
+    }
+
+    fn reserve(&self, _bytes: u64) {}
+
+    fn release(&self, _bytes: u64) {}
 }

@@ -2,7 +2,7 @@
 //! other programs read it as a mesh. Gmsh replaces it when it remeshes.
 
 use super::Binary;
-use planish_core::atlas::Chart;
+use planish_core::CertifiedChart;
 use planish_core::seams::{Curve, SeamNetwork};
 use planish_core::subdivide::LinearAtlas;
 
@@ -23,14 +23,14 @@ struct Block {
 }
 
 /// Appends both sections.
-pub fn write(out: &mut Binary, charts: &[Chart], linear: &LinearAtlas, network: &SeamNetwork) {
+pub fn write(out: &mut Binary, charts: &[CertifiedChart], linear: &LinearAtlas, network: &SeamNetwork) {
     let (blocks, number) = blocks(charts, linear, network);
     out.section("Nodes", |out| nodes(out, &blocks, linear));
     out.section("Elements", |out| elements(out, &blocks, &number));
 }
 
 /// The blocks of points, curves and surfaces, and the number of each node of the atlas, from 1 in their order.
-fn blocks(charts: &[Chart], linear: &LinearAtlas, network: &SeamNetwork) -> (Vec<Block>, Vec<u64>) {
+fn blocks(charts: &[CertifiedChart], linear: &LinearAtlas, network: &SeamNetwork) -> (Vec<Block>, Vec<u64>) {
     let mut number = vec![0; linear.points().len()];
     let mut last = 0;
     let mut block = |dimension, entity, kind, elements: Vec<u32>| {
@@ -52,16 +52,16 @@ fn blocks(charts: &[Chart], linear: &LinearAtlas, network: &SeamNetwork) -> (Vec
         blocks.push(block(1, curve.id().index(), LINE, lines(curve, charts, linear)));
     }
     for (entity, (chart, l)) in charts.iter().zip(linear.charts()).enumerate() {
-        let corners = chart.triangles().iter().flatten().map(|v| l.nodes()[v.index()]);
+        let corners = chart.chart().triangles().iter().flatten().map(|v| l.nodes()[v.index()]);
         blocks.push(block(2, entity, TRIANGLE, corners.collect()));
     }
     (blocks, number)
 }
 
 /// The edges of the surface along a curve.
-fn lines(curve: &Curve, charts: &[Chart], linear: &LinearAtlas) -> Vec<u32> {
+fn lines(curve: &Curve, charts: &[CertifiedChart], linear: &LinearAtlas) -> Vec<u32> {
     let side = &curve.sides()[0];
-    let (chart, l) = (&charts[side.chart.index()], &linear.charts()[side.chart.index()]);
+    let (chart, l) = (charts[side.chart.index()].chart(), &linear.charts()[side.chart.index()]);
     let node = |h| l.nodes()[chart.from(h).index()];
     side.half_edges.iter().flat_map(|h| [node(*h), node(h.next())]).collect()
 }

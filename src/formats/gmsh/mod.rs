@@ -12,7 +12,7 @@ pub use geo::{Algorithms, Narrow, Script, remesh};
 pub use read::{AtlasError, read as read_atlas};
 
 use binary::Binary;
-use planish_core::atlas::Chart;
+use planish_core::CertifiedAtlas;
 use planish_core::seams::SeamNetwork;
 use planish_core::subdivide::{LinearAtlas, LinearChart};
 use planish_core::topology::ChartId;
@@ -20,13 +20,14 @@ use planish_core::vec3::BoundingBox;
 
 /// The bytes of `atlas.msh`: MSH 4.1, binary, little endian.
 ///
-/// `$Entities` holds the boundary representation: a point for every end of a curve, the curves of `network`, a
+/// `$Entities` holds the boundary representation: a point for every end of a curve, its curves, a
 /// surface per chart. `$Parametrizations` holds the curves as polylines and the charts as triangulations in space
 /// and in the plane; see docs/gmsh.md for what Gmsh asks of it. Tags are positions plus one.
-pub fn atlas(charts: &[Chart], linear: &LinearAtlas, network: &SeamNetwork) -> Vec<u8> {
+pub fn atlas(atlas: &CertifiedAtlas, linear: &LinearAtlas) -> Vec<u8> {
+    let network = atlas.seams();
     let mut out = Binary::new();
     out.section("Entities", |out| entities(out, linear, network));
-    mesh::write(&mut out, charts, linear, network);
+    mesh::write(&mut out, atlas.charts(), linear, network);
     out.section("Parametrizations", |out| parametrizations(out, linear));
     out.bytes
 }

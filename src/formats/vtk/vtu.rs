@@ -3,10 +3,10 @@
 use super::error::VtkError;
 pub use super::read_back::{read, read_shape};
 use planish_core::atlas::Chart;
-use planish_core::certify::CertifiedMap;
 use planish_core::measure::distortion::CellFields;
-use planish_core::mesh::SurfaceMesh;
+use planish_core::topology::{EdgeId, VertexId};
 use planish_core::vec3::midpoint;
+use planish_core::{CertifiedAtlas, CertifiedChart};
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, IOBuffer, UnstructuredGridPiece, Version,
     VertexNumbers, Vtk,
@@ -15,22 +15,6 @@ use vtkio::xml::Compressor;
 
 /// What every reader can unpack: meshio does not know LZ4.
 pub(super) const COMPRESSOR: Compressor = Compressor::ZLib;
-
-/// A chart with everything that its part of the files shows.
-pub struct ChartView<'a> {
-    /// The surface it belongs to.
-    pub mesh: &'a SurfaceMesh,
-    /// The chart.
-    pub chart: &'a Chart,
-    /// Its map.
-    pub map: &'a CertifiedMap,
-    /// The fields of its triangles.
-    pub fields: &'a [CellFields],
-    /// Per triangle, whether it was invalid and was repaired.
-    pub untangled: &'a [bool],
-    /// A small number that differs from that of every neighbour.
-    pub colour: u32,
-}
 
 /// Why a file cannot be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -88,46 +72,47 @@ pub fn shift(index: usize, count: usize) -> [f64; 2] {
 ///
 /// # Errors
 /// [`VtuError::Library`].
-pub fn surface(views: &[ChartView]) -> Result<Vec<u8>, VtuError> {
-    encode(views, "planish surface", |view, _, node, _| position(view, node))
+pub fn surface(atlas: &CertifiedAtlas) -> Result<Vec<u8>, VtuError> {
+    encode(atlas, "planish surface", |certified, node, _| position(certified.chart(), node))
 }
 
 /// The bytes of param.vtu: the same cells in the parametric plane, charts side by side.
 ///
 /// # Errors
 /// [`VtuError::Library`].
-pub fn param(views: &[ChartView]) -> Result<Vec<u8>, VtuError> {
-    encode(views, "planish parametric plane", |_, index, _, uv| {
-        let [x, y] = shift(index, views.len());
+pub fn param(atlas: &CertifiedAtlas) -> Result<Vec<u8>, VtuError> {
+    encode(atlas, "planish parametric plane", |certified, _, uv| {
+        let [x, y] = shift(certified.id().index(), atlas.charts().len());
         [uv[0] + x, uv[1] + y, 0.0]
     })
 }
 
 /// The position of a node in space: that of a vertex, or the middle of a straight edge.
-fn position(view: &ChartView, node: usize) -> [f64; 3] {
-    let location = |v: planish_core::topology::VertexId| view.mesh.points()[view.chart.vertices()[v.index()].index()];
-    let vertices = view.chart.vertices().len();
+fn position(chart: &Chart, node: usize) -> [f64; 3] {
+    let vertices = chart.points().len();
     if node < vertices {
-        return view.mesh.points()[view.chart.vertices()[node].index()];
+        return chart.points()[node];
     }
-    let h = view.chart.edges().sides(planish_core::topology::EdgeId::at(node - vertices))[0];
-    midpoint(location(view.chart.from(h)), location(view.chart.from(h.next())))
+    let h = chart.edges().sides(EdgeId::at(node - vertices))[0];
+    let [from, to] = [h, h.next()].map(|h| chart.points()[chart.from(h).index()]);
+    midpoint(from, to)
 }
 
-/// Writes all charts as one piece; `location` gives the position of a node from view, index of the chart, node, uv.
+/// Writes all charts as one piece; `place` gives the position of a node from its chart, its number there, and its uv.
 fn encode(
-    views: &[ChartView],
+    atlas: &CertifiedAtlas,
     title: &str,
-    location: impl Fn(&ChartView, usize, usize, [f64; 2]) -> [f64; 3],
+    place: impl Fn(&CertifiedChart, usize, [f64; 2]) -> [f64; 3],
 ) -> Result<Vec<u8>, VtuError> {
     let mut points: Vec<f64> = Vec::new();
     let mut connectivity: Vec<u64> = Vec::new();
-    for (index, view) in views.iter().enumerate() {
+    for certified in atlas.charts() {
         let base = points.len() as u64 / 3;
-        for (node, p) in view.map.map().nodes.iter().enumerate() {
-            points.extend(location(view, index, node, p.uv()));
+        let map = certified.map().map();
+        for (node, p) in map.nodes.iter().enumerate() {
+            points.extend(place(certified, node, p.uv()));
         }
-        connectivity.extend(view.map.map().cells.iter().flatten().map(|n| base + u64::from(*n)));
+        connectivity.extend(map.cells.iter().flatten().map(|n| base + u64::from(*n)));
     }
     let cells = connectivity.len() / 6;
     let offsets = (1..=cells as u64).map(|i| 6 * i).collect();
@@ -142,7 +127,7 @@ fn encode(
                 cell_verts: VertexNumbers::XML { connectivity, offsets },
                 types: vec![CellType::QuadraticTriangle; cells],
             },
-            data: Attributes { point: point_fields(views), cell: cell_fields(views) },
+            data: Attributes { point: point_fields(atlas), cell: cell_fields(atlas) },
         }),
     };
     let library = |e: &dyn std::fmt::Display| VtuError::Library(e.to_string());
@@ -157,30 +142,34 @@ fn array(name: &str, components: u32, data: impl Into<IOBuffer>) -> Attribute {
 }
 
 /// `uv` and `vertex` of every node.
-fn point_fields(views: &[ChartView]) -> Vec<Attribute> {
-    let nodes = |v: &ChartView| v.map.map().nodes.clone();
-    let uv: Vec<f64> = views.iter().flat_map(nodes).flat_map(|p| p.uv()).collect();
+fn point_fields(atlas: &CertifiedAtlas) -> Vec<Attribute> {
+    let mut uv: Vec<f64> = Vec::new();
     let mut vertex: Vec<i32> = Vec::new();
-    for view in views {
-        let welded = |v: &planish_core::topology::VertexId| view.mesh.input_vertex(*v).map_or(-2, |w| w as i32);
-        vertex.extend(view.chart.vertices().iter().map(welded));
-        vertex.resize(vertex.len() + view.map.map().nodes.len() - view.chart.vertices().len(), -1);
+    for certified in atlas.charts() {
+        let (chart, nodes) = (certified.chart(), &certified.map().map().nodes);
+        uv.extend(nodes.iter().flat_map(|p| p.uv()));
+        let vertices = (0..chart.vertices().len()).map(VertexId::at);
+        vertex.extend(vertices.map(|v| chart.input_vertex(v).map_or(-2, |w| w as i32)));
+        vertex.resize(uv.len() / 2, -1);
     }
     vec![array("uv", 2, uv), array("vertex", 1, vertex)]
 }
 
 /// The fields of every triangle.
-fn cell_fields(views: &[ChartView]) -> Vec<Attribute> {
-    let chart: Vec<i32> = views.iter().zip(0..).flat_map(|(v, i)| vec![i; v.fields.len()]).collect();
-    let colour: Vec<i32> = views.iter().flat_map(|v| vec![v.colour as i32; v.fields.len()]).collect();
-    let source = |v: &ChartView| -> Vec<i32> {
-        v.chart.faces().iter().map(|f| v.mesh.source_triangle(f.index()) as i32).collect()
-    };
-    let triangle: Vec<i32> = views.iter().flat_map(source).collect();
-    let untangled: Vec<u8> = views.iter().flat_map(|v| v.untangled).map(|u| u8::from(*u)).collect();
-    let field = |name: &str, get: fn(&CellFields) -> f64| {
-        array(name, 1, views.iter().flat_map(|v| v.fields).map(get).collect::<Vec<f64>>())
-    };
+fn cell_fields(atlas: &CertifiedAtlas) -> Vec<Attribute> {
+    let mut chart: Vec<i32> = Vec::new();
+    let mut triangle: Vec<i32> = Vec::new();
+    let mut untangled: Vec<u8> = Vec::new();
+    let mut colour: Vec<i32> = Vec::new();
+    for (certified, chart_colour) in atlas.charts().iter().zip(atlas.seams().colours()) {
+        let cells = 0..certified.fields().len();
+        triangle.extend(cells.map(|f| certified.chart().source_triangle(f) as i32));
+        chart.resize(triangle.len(), certified.id().0 as i32);
+        colour.resize(triangle.len(), chart_colour as i32);
+        untangled.extend(certified.untangled().map(u8::from));
+    }
+    let fields = || atlas.charts().iter().flat_map(CertifiedChart::fields);
+    let field = |name: &str, get: fn(&CellFields) -> f64| array(name, 1, fields().map(get).collect::<Vec<f64>>());
     vec![
         array("chart", 1, chart),
         array("triangle", 1, triangle),

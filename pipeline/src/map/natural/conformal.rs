@@ -7,80 +7,51 @@
 use super::{Natural, certified};
 use crate::atlas::Chart;
 use crate::certify::parts;
-use crate::fem::sparse::{self, PRESCRIBED, Pattern};
+use crate::fem::assembly::Assembly;
+use crate::fem::dofs::Dofs;
+use crate::fem::sparse;
 use crate::mesh::TriangleShape;
 use crate::monitor::Monitor;
 
 /// The least squares conformal map of `chart`; none where it is not one-to-one.
 ///
 /// # Errors
-/// The system cannot be solved.
+/// The system cannot be solved, or interrupted.
 pub fn conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Option<Natural>, sparse::Error> {
     let held = far_apart(chart);
-    let numbers = Numbers::new(chart.vertices().len() + chart.edges().len(), held);
-    let nodes: Vec<[usize; 3]> = chart.cells().flat_map(similar).collect();
-    let elements: Vec<[u32; 6]> = nodes.iter().map(|part| numbers.unknowns(*part)).collect();
-    let pattern = Pattern::new(numbers.count(), &elements);
-    let mut values = pattern.zeros();
-    let mut rhs = vec![0.0; numbers.count()];
-    for (f, unknowns) in elements.iter().enumerate() {
+    let nodes = chart.vertices().len() + chart.edges().len();
+    // u and v of each node are scalars of their own, side by side; those of the two nodes that are held are prescribed.
+    let free = (0..nodes).filter(|n| !held.contains(n)).flat_map(scalars);
+    let dofs = Dofs::new(2 * nodes, free.map(|s| s as u32).collect());
+    let parts: Vec<[usize; 6]> = chart.cells().flat_map(similar).map(part_scalars).collect();
+    let pattern = dofs.pattern(parts.iter().copied());
+    // One node is held at the origin, the other at (1, 0).
+    let mut prescribed = vec![[0.0]; 2 * nodes];
+    prescribed[scalars(held[1])[0]] = [1.0];
+    let mut system = Assembly::new(&dofs, &pattern, prescribed);
+    for (i, part) in parts.iter().enumerate() {
         // The four parts of a triangle have its shape, and so its matrix.
-        let matrix = element(&chart.shapes()[f / 4]);
-        pattern.add(&mut values, f, &matrix);
-        // One node is held at the origin, the other at (1, 0).
-        if let Some(k) = nodes[f].iter().position(|n| *n == held[1]) {
-            let entries = unknowns.iter().zip(&matrix).filter(|(row, _)| **row != PRESCRIBED);
-            entries.for_each(|(row, entries)| rhs[*row as usize] -= entries[k]);
-        }
+        system.add(i, part, &element(&chart.shapes()[i / 4]));
     }
-    pattern.analyse()?.factorise(&values, monitor)?.solve(&mut rhs, 1);
-    Ok(certified(chart, &numbers.places(&rhs)))
+    let solution = system.solve(&pattern.analyse()?, monitor)?;
+    let uv: Vec<[f64; 2]> = (0..nodes).map(|n| scalars(n).map(|s| solution[s][0])).collect();
+    Ok(certified(chart, &uv))
+}
+
+/// The numbers of u and v at a node.
+fn scalars(node: usize) -> [usize; 2] {
+    [2 * node, 2 * node + 1]
+}
+
+/// The scalars of three nodes: u of each, then v of each.
+fn part_scalars(nodes: [usize; 3]) -> [usize; 6] {
+    std::array::from_fn(|i| scalars(nodes[i % 3])[i / 3])
 }
 
 /// The four parts of a triangle, each with its corners in the order in which they have the angles of the triangle's.
 fn similar(cell: [u32; 6]) -> [[usize; 3]; 4] {
     let [a, b, c, [ab, bc, ca]] = parts(cell.map(|n| n as usize));
     [a, b, c, [bc, ca, ab]]
-}
-
-/// The numbers of the unknowns: u and v of every node but the two that are held.
-struct Numbers {
-    of_node: Vec<u32>,
-    held: [usize; 2],
-}
-
-impl Numbers {
-    fn new(nodes: usize, held: [usize; 2]) -> Self {
-        let mut next = 0;
-        let number = |n: usize| {
-            if held.contains(&n) {
-                return PRESCRIBED;
-            }
-            next += 2;
-            next - 2
-        };
-        Self { of_node: (0..nodes).map(number).collect(), held }
-    }
-
-    fn count(&self) -> usize {
-        2 * (self.of_node.len() - 2)
-    }
-
-    /// Those of three nodes: u of each, then v of each.
-    fn unknowns(&self, nodes: [usize; 3]) -> [u32; 6] {
-        let v = |u: u32| if u == PRESCRIBED { PRESCRIBED } else { u + 1 };
-        let [a, b, c] = nodes.map(|n| self.of_node[n]);
-        [a, b, c, v(a), v(b), v(c)]
-    }
-
-    /// Where the nodes lie, by the unknowns.
-    fn places(&self, solution: &[f64]) -> Vec<[f64; 2]> {
-        let place = |(node, number): (usize, &u32)| match *number {
-            PRESCRIBED => [if node == self.held[1] { 1.0 } else { 0.0 }, 0.0],
-            u => [solution[u as usize], solution[u as usize + 1]],
-        };
-        self.of_node.iter().enumerate().map(place).collect()
-    }
 }
 
 /// Two vertices of the outer loop, half of its length apart: the first one, and the one opposite.

@@ -16,10 +16,10 @@ mod projection;
 
 use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
+use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, quantiles, singular_ratio};
-use crate::mesh::SurfaceMesh;
-use crate::monitor::Monitor;
+use crate::monitor::{Interrupted, Monitor};
 pub use conformal::conformal;
 pub use projection::projection;
 
@@ -49,23 +49,32 @@ const UNROLLED: usize = 20_000;
 /// of the area where a chart is projected (pins_instanced, at 303: 38 elements below gamma 0.1).
 const EVEN: f64 = 100.0;
 
-/// A natural map that stretches `chart`, one of `mesh`, less than `on_disk`, the conformal distortion that its map on
+/// A natural map that stretches `chart` less than `on_disk`, the conformal distortion that its map on
 /// the disk does not exceed on 99 % of the area; none where there is none, or that is not found by reasonable means.
-pub fn natural(mesh: &SurfaceMesh, chart: &Chart, on_disk: f64, monitor: &dyn Monitor) -> Option<Natural> {
-    let unrolled = || {
-        let is_wanted = on_disk > UNEVEN && chart.triangles().len() <= UNROLLED;
-        // Where the system cannot be solved, there is the map on the disk.
-        let found = is_wanted.then(|| conformal(chart, monitor).ok()).flatten().flatten();
-        found.filter(|n| n.distortion.conformal_p99 < on_disk)
-    };
+///
+/// # Errors
+/// [`Interrupted`].
+pub fn natural(chart: &Chart, on_disk: f64, monitor: &dyn Monitor) -> Result<Option<Natural>, Interrupted> {
     let is_even = |n: &Natural| n.distortion.area_ratio < EVEN;
-    projection(mesh, chart, on_disk.min(STEEP)).filter(is_even).or_else(unrolled).filter(is_even)
+    if let Some(projected) = projection(chart, on_disk.min(STEEP)).filter(is_even) {
+        return Ok(Some(projected));
+    }
+    if on_disk <= UNEVEN || chart.triangles().len() > UNROLLED {
+        return Ok(None);
+    }
+    let unrolled = match conformal(chart, monitor) {
+        Ok(unrolled) => unrolled,
+        Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted),
+        // There is the map on the disk.
+        Err(sparse::Error::Unsolvable(_)) => None,
+    };
+    Ok(unrolled.filter(|n| n.distortion.conformal_p99 < on_disk && is_even(n)))
 }
 
-/// The map with the nodes of a chart at `places` (its vertices, then the middles of its edges), scaled to fit and
+/// The map with the nodes of a chart at `uv` (its vertices, then the middles of its edges), scaled to fit and
 /// rounded to the grid; none where it is not one-to-one.
-fn certified(chart: &Chart, places: &[[f64; 2]]) -> Option<Natural> {
-    let nodes = fitted(places)?.into_iter().map(GridPoint::mid).collect();
+fn certified(chart: &Chart, uv: &[[f64; 2]]) -> Option<Natural> {
+    let nodes = fitted(uv)?.into_iter().map(GridPoint::mid).collect();
     let map = PlanarMap { cells: chart.cells().collect(), nodes, hole_centres: vec![] };
     let map = prove_straight(map).ok()?;
     let distortion = summary(chart, map.map());
@@ -73,14 +82,14 @@ fn certified(chart: &Chart, places: &[[f64; 2]]) -> Option<Natural> {
 }
 
 /// Places moved and scaled into a disk of [`RADIUS`] around the origin; none where they all are one, or not finite.
-fn fitted(places: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-    let bound = |k: usize, f: fn(f64, f64) -> f64, start| places.iter().map(|p| p[k]).fold(start, f);
-    let least = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
-    let most = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
-    let half = 0.5 * (most[0] - least[0]).hypot(most[1] - least[1]);
+fn fitted(uv: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+    let bound = |k: usize, f: fn(f64, f64) -> f64, start| uv.iter().map(|p| p[k]).fold(start, f);
+    let min = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
+    let max = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
+    let half = 0.5 * (max[0] - min[0]).hypot(max[1] - min[1]);
     let scale = RADIUS / half;
-    let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (least[k] + most[k])) * scale);
-    (scale.is_finite() && scale > 0.0).then(|| places.iter().map(moved).collect())
+    let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (min[k] + max[k])) * scale);
+    (scale.is_finite() && scale > 0.0).then(|| uv.iter().map(moved).collect())
 }
 
 /// How much the parts of a chart's triangles are stretched. The area ratio is that of parts, not of stars.
@@ -93,28 +102,36 @@ fn summary(chart: &Chart, map: &PlanarMap) -> Summary {
         let flat = [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
         let area = 0.25 * shape.area();
         for (from, to) in parts(flat).into_iter().zip(parts(uv)) {
-            let (stretch, scale) = stretch(from, to);
-            conformal.push((stretch, area));
-            scales.push((scale, area));
+            let stretch = Stretch::between(from, to);
+            conformal.push((stretch.conformal, area));
+            scales.push((stretch.area, area));
         }
     }
     let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
-    let [least, most] = quantiles(&mut scales, [0.001, 0.999]);
-    Summary { conformal_median, conformal_p99, area_ratio: (most / least).clamp(1.0, f64::MAX) }
+    let [min, max] = quantiles(&mut scales, [0.001, 0.999]);
+    Summary { conformal_median, conformal_p99, area_ratio: (max / min).clamp(1.0, f64::MAX) }
 }
 
-/// The ratio of the singular values of the linear map from one triangle of the plane to another, and that of their
-/// areas.
-fn stretch(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> (f64, f64) {
-    let sides = |t: [[f64; 2]; 3]| [1, 2].map(|i| [t[i][0] - t[0][0], t[i][1] - t[0][1]]);
-    let ([p, q], [u, v]) = (sides(from), sides(to));
-    let doubled = p[0] * q[1] - p[1] * q[0];
-    // The columns of the matrix.
-    let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled);
-    let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled);
-    let det = x[0] * y[1] - x[1] * y[0];
-    let bounded = |x: f64| if x.is_finite() && x > 0.0 { x } else { f64::MAX };
-    (bounded(singular_ratio(x, y, det)).max(1.0), bounded(det))
+/// How the linear map from one triangle of the plane to another stretches.
+struct Stretch {
+    /// The ratio of its singular values, at least 1.
+    conformal: f64,
+    /// The ratio of areas.
+    area: f64,
+}
+
+impl Stretch {
+    fn between(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> Self {
+        let sides = |t: [[f64; 2]; 3]| [1, 2].map(|i| [t[i][0] - t[0][0], t[i][1] - t[0][1]]);
+        let ([p, q], [u, v]) = (sides(from), sides(to));
+        let doubled = p[0] * q[1] - p[1] * q[0];
+        // The columns of the matrix.
+        let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled);
+        let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled);
+        let det = x[0] * y[1] - x[1] * y[0];
+        let bounded = |x: f64| if x.is_finite() && x > 0.0 { x } else { f64::MAX };
+        Self { conformal: bounded(singular_ratio(x, y, det)).max(1.0), area: bounded(det) }
+    }
 }
 
 #[cfg(test)]
@@ -125,11 +142,10 @@ mod tests {
     use crate::vec3::Vec3;
     use crate::{decompose, repair, shapes};
 
-    fn charts(soup: &TriangleSoup) -> (SurfaceMesh, Vec<Chart>) {
+    fn charts(soup: &TriangleSoup) -> Vec<Chart> {
         let mesh = repair(soup, &Default::default()).expect("repairs").mesh;
         let no_features = decompose::Settings { feature_angle: None, ..Default::default() };
-        let atlas = decompose(&mesh, &no_features, &NoMonitor).expect("decomposes");
-        (mesh, atlas.into_charts())
+        decompose(&mesh, &no_features, &NoMonitor).expect("decomposes").into_charts()
     }
 
     fn moved(soup: &TriangleSoup, to: impl Fn(Vec3) -> Vec3) -> TriangleSoup {
@@ -140,16 +156,16 @@ mod tests {
     #[test]
     fn a_plate_with_holes_is_projected_as_it_is_and_a_dome_as_far_as_it_is_flat() {
         let flat = moved(&shapes::disk_with_holes(13, 2), |[x, y, _]| [5.0 + 0.6 * x, y, -0.8 * x]);
-        let (mesh, plate) = charts(&flat);
-        let of_plate = projection(&mesh, &plate[0], 1.1).expect("it is flat").distortion;
+        let plate = charts(&flat);
+        let of_plate = projection(&plate[0], 1.1).expect("it is flat").distortion;
         assert!(
             (of_plate.conformal_p99 - 1.0).abs() < 1e-9 && (of_plate.area_ratio - 1.0).abs() < 1e-9,
             "{of_plate:?}"
         );
-        let (mesh, dome) = charts(&shapes::disk(8));
-        let steep = projection(&mesh, &dome[0], 4.0).expect("hardly bent").distortion.conformal_p99;
+        let dome = charts(&shapes::disk(8));
+        let steep = projection(&dome[0], 4.0).expect("hardly bent").distortion.conformal_p99;
         assert!(steep > 1.05, "{steep}");
-        assert!(projection(&mesh, &dome[0], 0.99 * steep).is_none(), "the bound holds");
+        assert!(projection(&dome[0], 0.99 * steep).is_none(), "the bound holds");
     }
 
     #[test]
@@ -168,8 +184,8 @@ mod tests {
             [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
         };
         let soup = TriangleSoup::new(points, quads.flat_map(halves).collect()).expect("sound");
-        let (mesh, strip) = charts(&soup);
-        assert!(projection(&mesh, &strip[0], f64::MAX).is_none(), "it turns back");
+        let strip = charts(&soup);
+        assert!(projection(&strip[0], f64::MAX).is_none(), "it turns back");
         let unrolled = conformal(&strip[0], &NoMonitor).expect("unrolled").expect("one-to-one").distortion;
         assert!((unrolled.conformal_p99 - 1.0).abs() < 1e-6 && unrolled.area_ratio < 1.0 + 1e-6, "{unrolled:?}");
     }
@@ -186,15 +202,15 @@ mod tests {
         let points = (0..2 * (n + 1)).map(point).collect();
         let halves = |i: u32| [[2 * i, 2 * i + 1, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 2]];
         let soup = TriangleSoup::new(points, (0..n).flat_map(halves).collect()).expect("sound");
-        let (mesh, ramp) = charts(&soup);
+        let ramp = charts(&soup);
         assert_eq!(ramp.len(), 1);
-        assert!(projection(&mesh, &ramp[0], f64::MAX).is_none());
+        assert!(projection(&ramp[0], f64::MAX).is_none());
         assert!(conformal(&ramp[0], &NoMonitor).expect("solved").is_none());
     }
 
     #[test]
     fn a_hemisphere_is_mapped_conformally() {
-        let (_, halves) = charts(&shapes::sphere(12));
+        let halves = charts(&shapes::sphere(12));
         let of = conformal(&halves[0], &NoMonitor).expect("solved").expect("one-to-one").distortion;
         assert!(of.conformal_p99 < 1.6, "{of:?}");
     }

@@ -7,14 +7,13 @@ use super::{Natural, certified};
 use crate::atlas::Chart;
 use crate::evaluate::Plane;
 use crate::measure::distortion::quantiles;
-use crate::mesh::SurfaceMesh;
 use crate::vec3::{Vec3, cross, dot, norm, sub};
 
-/// The projection of `chart`, one of `mesh`, along the mean of its normals; none where that is not one-to-one, or the
+/// The projection of `chart` along the mean of its normals; none where that is not one-to-one, or the
 /// conformal distortion of a hundredth of the area is above `most`.
-pub fn projection(mesh: &SurfaceMesh, chart: &Chart, most: f64) -> Option<Natural> {
-    let triangles = || chart.faces().iter().map(|f| mesh.corners(f.index()));
-    let origin = mesh.points()[chart.vertices().first()?.index()];
+pub fn projection(chart: &Chart, most: f64) -> Option<Natural> {
+    let triangles = || (0..chart.triangles().len()).map(|f| chart.corners(f));
+    let origin = *chart.points().first()?;
     let plane = Plane::facing(origin, triangles())?;
     let steepness = |[a, b, c]: [Vec3; 3]| {
         let doubled = cross(sub(b, a), sub(c, a));
@@ -26,11 +25,11 @@ pub fn projection(mesh: &SurfaceMesh, chart: &Chart, most: f64) -> Option<Natura
     if p99 > most {
         return None;
     }
-    let mut places: Vec<[f64; 2]> = chart.vertices().iter().map(|v| plane.place(mesh.points()[v.index()])).collect();
+    let mut uv: Vec<[f64; 2]> = chart.points().iter().map(|p| plane.place(*p)).collect();
     for (_, sides) in chart.edges().iter() {
         let [h, t] = [sides[0], sides[0].next()];
-        let ends = [chart.from(h), chart.from(t)].map(|v| places[v.index()]);
-        places.push([0, 1].map(|k| 0.5 * (ends[0][k] + ends[1][k])));
+        let ends = [chart.from(h), chart.from(t)].map(|v| uv[v.index()]);
+        uv.push([0, 1].map(|k| 0.5 * (ends[0][k] + ends[1][k])));
     }
-    certified(chart, &places)
+    certified(chart, &uv)
 }

@@ -1,11 +1,14 @@
 //! Charts: parts of a surface that a disk can carry.
 
-use crate::mesh::TriangleShape;
-use crate::topology::EdgeTable;
-use crate::topology::{ChartId, FaceId, HalfEdgeId, VertexId};
+use crate::mesh::{Metric, Patch, SurfaceMesh, TriangleShape};
+use crate::topology::{ChartId, EdgeTable, FaceId, HalfEdgeId, VertexId};
+use crate::vec3::Vec3;
 
 /// A connected, oriented part of a surface of genus 0 whose boundary loops are simple and share no vertex.
 /// Made by [`crate::decompose()`].
+///
+/// A chart knows which vertices and triangles of the surface are its own, but needs the surface for nothing: it has all
+/// that is known of them.
 #[derive(Clone, Debug)]
 pub struct Chart {
     pub(crate) id: ChartId,
@@ -18,6 +21,7 @@ pub struct Chart {
     pub(crate) edges: EdgeTable,
     pub(crate) outer: Vec<HalfEdgeId>,
     pub(crate) holes: Vec<Vec<HalfEdgeId>>,
+    pub(crate) patch: Patch,
 }
 
 impl Chart {
@@ -49,6 +53,31 @@ impl Chart {
     /// Per triangle, whether mollification changed its area by more than 1 %.
     pub fn flagged(&self) -> &[bool] {
         &self.flagged
+    }
+
+    /// The positions of the vertices, in the unit of the input.
+    pub fn points(&self) -> &[Vec3] {
+        &self.patch.points
+    }
+
+    /// The corners of a triangle in space.
+    pub fn corners(&self, face: usize) -> [Vec3; 3] {
+        self.triangles[face].map(|v| self.patch.points[v.index()])
+    }
+
+    /// The position in the input file of triangle `face`.
+    pub fn source_triangle(&self, face: usize) -> u32 {
+        self.patch.source[face]
+    }
+
+    /// The welded vertex that a vertex is a copy of (see [`SurfaceMesh::welded_vertex`]).
+    pub fn welded_vertex(&self, vertex: VertexId) -> u32 {
+        self.patch.welded[vertex.index()]
+    }
+
+    /// The welded vertex, unless `vertex` was added (see [`SurfaceMesh::input_vertex`]).
+    pub fn input_vertex(&self, vertex: VertexId) -> Option<u32> {
+        (vertex.index() < self.patch.added_from).then(|| self.welded_vertex(vertex))
     }
 
     /// The mollified area of a triangle in the unit of the input, squared.
@@ -96,6 +125,23 @@ impl Chart {
     pub fn length(&self, h: HalfEdgeId) -> f64 {
         self.shapes[h.face().index()].lengths[h.side()]
     }
+
+    /// The chart as a surface of its own, vertices and triangles numbered as in the chart.
+    pub(crate) fn to_surface(&self) -> SurfaceMesh {
+        let metric = Metric {
+            shapes: self.shapes.clone(),
+            flagged: self.flagged.clone(),
+            mollified_by: self.patch.mollified_by,
+            scale: self.scale,
+        };
+        SurfaceMesh::of_patch(self.triangles.clone(), self.edges.clone(), metric, self.patch.clone())
+    }
+}
+
+impl AsRef<Chart> for Chart {
+    fn as_ref(&self) -> &Self {
+        self
+    }
 }
 
 /// The charts of a surface; together they hold every triangle once.
@@ -119,10 +165,5 @@ impl Atlas {
     /// The charts, one by one.
     pub fn into_charts(self) -> Vec<Chart> {
         self.charts
-    }
-
-    /// Numbers charts (those of an atlas, some of them split) in the order given.
-    pub fn renumber<'a>(charts: impl IntoIterator<Item = &'a mut Chart>) {
-        charts.into_iter().enumerate().for_each(|(i, chart)| chart.id = ChartId::at(i));
     }
 }

@@ -8,13 +8,13 @@
 //! Cutting is no end in itself: more charts mean more curves on which the nodes of a mesh are bound to lie. A cut is
 //! tried, and taken only where all parts suit a mesher and are few.
 
-use super::{MapError, MappedChart, Order, SplitError, map_within};
+use super::job::{ChartError, MapError, Maps, map_within};
 use crate::atlas::Chart;
 use crate::decompose;
 use crate::map::natural;
 use crate::measure::distortion;
-use crate::mesh::SurfaceMesh;
-use crate::monitor::Monitor;
+use crate::monitor::{Interrupted, Monitor};
+use crate::settings::ChartSettings;
 
 /// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
 /// of a terrain, at 10 to 50, and soccerball_g31, at 80, are well left whole.
@@ -38,20 +38,18 @@ const FEW: usize = 3;
 const MANY: usize = 20;
 
 /// A chart and its map.
-type Mapped = (Chart, MappedChart);
+type Mapped = (Chart, Maps);
 
 /// What cutting needs to know beside the chart.
 pub(super) struct Cutter<'a> {
-    pub(super) mesh: &'a SurfaceMesh,
-    pub(super) order: Order,
-    pub(super) settings: &'a decompose::Settings,
+    pub(super) settings: &'a ChartSettings,
     pub(super) monitor: &'a dyn Monitor,
 }
 
 /// What comes of an attempt to map a chart.
 pub(super) enum Attempt {
     /// Its map.
-    Mapped(Box<MappedChart>),
+    Mapped(Box<Maps>),
     /// Its parts: it cannot be mapped as a whole.
     Split(Vec<Chart>),
     /// Neither: it is a single triangle.
@@ -70,11 +68,11 @@ impl Cutter<'_> {
     /// The parts into which `chart` is to be cut; none where it suits a mesher as it is, or cutting does not help.
     ///
     /// # Errors
-    /// [`SplitError`].
-    pub(super) fn parts(&self, chart: &Chart, map: &MappedChart) -> Result<Option<Vec<Mapped>>, SplitError> {
+    /// [`ChartError`].
+    pub(super) fn parts(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Mapped>>, ChartError> {
         let on_disk = map.conformal_p99(chart);
         // Only a chart that the disk does not suit is asked for a natural map.
-        if on_disk <= STRETCHED || self.suits(chart, on_disk, STRETCHED) == Suits::Natural {
+        if on_disk <= STRETCHED || self.suits(chart, on_disk, STRETCHED)? == Suits::Natural {
             return Ok(None);
         }
         let most = chart.holes().len().max(1) * if on_disk > TORN { MANY } else { FEW };
@@ -93,10 +91,10 @@ impl Cutter<'_> {
     fn parts_within(
         &self,
         chart: &Chart,
-        map: &MappedChart,
+        map: &Maps,
         bound: f64,
         most: usize,
-    ) -> Result<Option<(Vec<Mapped>, usize)>, SplitError> {
+    ) -> Result<Option<(Vec<Mapped>, usize)>, ChartError> {
         let (mut done, mut naturals) = (Vec::new(), 0);
         let Some(mut waiting) = self.halves(chart, map)? else { return Ok(None) };
         while let Some(part) = waiting.pop() {
@@ -112,7 +110,7 @@ impl Cutter<'_> {
                 // Left to the caller's rule for charts that do not map.
                 Attempt::Single => return Ok(None),
             };
-            let suits = self.suits(&part, map.conformal_p99(&part), bound);
+            let suits = self.suits(&part, map.conformal_p99(&part), bound)?;
             let parts = if suits == Suits::Neither { self.halves(&part, &map)? } else { None };
             match parts {
                 // Nothing becomes smaller.
@@ -130,40 +128,40 @@ impl Cutter<'_> {
     /// Maps a chart, or splits it once where it touches itself in space, cannot be mapped, or would be too distorted.
     ///
     /// # Errors
-    /// [`SplitError`].
-    pub(super) fn attempt(&self, chart: &Chart) -> Result<Attempt, SplitError> {
-        let &Self { mesh, order, settings, monitor } = self;
-        if let Some(ends) = decompose::contact(mesh, chart) {
-            return Ok(Attempt::Split(decompose::separate(mesh, chart, ends, settings, monitor)?));
+    /// [`ChartError`].
+    pub(super) fn attempt(&self, chart: &Chart) -> Result<Attempt, ChartError> {
+        let &Self { settings: &ChartSettings { order, ref decompose }, monitor } = self;
+        if let Some(ends) = decompose::contact(chart) {
+            return Ok(Attempt::Split(decompose::separate(chart, ends, decompose, monitor)?));
         }
-        let error = match map_within(chart, order, settings.max_area_ratio, monitor) {
+        let error = match map_within(chart, order, decompose.max_area_ratio, monitor) {
             Ok(map) => return Ok(Attempt::Mapped(Box::new(map))),
             Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
             Err(error) => error,
         };
-        let parts = decompose::split(mesh, chart, error.log_scales(), settings, monitor)?;
+        let parts = decompose::split(chart, error.log_scales(), decompose, monitor)?;
         Ok(parts.map_or(Attempt::Single, Attempt::Split))
     }
 
     /// `on_disk` is how much the map of the chart stretches.
-    fn suits(&self, chart: &Chart, on_disk: f64, bound: f64) -> Suits {
-        let natural = natural::natural(self.mesh, chart, on_disk, self.monitor);
-        if natural.is_some_and(|n| n.distortion.conformal_p99 <= bound) {
+    fn suits(&self, chart: &Chart, on_disk: f64, bound: f64) -> Result<Suits, Interrupted> {
+        let natural = natural::natural(chart, on_disk, self.monitor)?;
+        Ok(if natural.is_some_and(|n| n.distortion.conformal_p99 <= bound) {
             Suits::Natural
         } else if on_disk <= bound {
             Suits::Disk
         } else {
             Suits::Neither
-        }
+        })
     }
 
     /// The chart cut once: through its first hole, or where the area scale changes. None for a single triangle.
-    fn halves(&self, chart: &Chart, map: &MappedChart) -> Result<Option<Vec<Chart>>, decompose::Error> {
+    fn halves(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Chart>>, decompose::Error> {
         match left_of_hole(map) {
-            Some(is_left) => decompose::halve(self.mesh, chart, &is_left, self.settings, self.monitor).map(Some),
+            Some(is_left) => decompose::halve(chart, &is_left, &self.settings.decompose, self.monitor).map(Some),
             None => {
                 let scales = distortion::log_scales(chart, &map.certified_start);
-                decompose::split(self.mesh, chart, Some(&scales), self.settings, self.monitor)
+                decompose::split(chart, Some(&scales), &self.settings.decompose, self.monitor)
             }
         }
     }
@@ -171,7 +169,7 @@ impl Cutter<'_> {
 
 /// Per triangle, whether it lies left of a line through the middle of the disk and that of the first hole, if there is
 /// one.
-fn left_of_hole(map: &MappedChart) -> Option<Vec<bool>> {
+fn left_of_hole(map: &Maps) -> Option<Vec<bool>> {
     let start = &map.certified_start;
     let centre = start.certificate().hole_centres.first()?.uv();
     let node = |n: u32| start.map().nodes[n as usize].uv();

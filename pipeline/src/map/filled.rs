@@ -1,4 +1,4 @@
-//! A chart with its holes closed by virtual fans, and the nodes of its quadratic elements.
+//! A chart with its holes filled by virtual fans, and the nodes of its quadratic elements.
 //!
 //! Every hole gets a virtual vertex, joined to the loop by isosceles triangles with legs r = max(P / 2 pi,
 //! l_max / sqrt 3) (P the perimeter, l_max the longest edge), so that every triangle inequality holds. The fans
@@ -12,32 +12,32 @@ use crate::topology::EdgeTable;
 use crate::topology::{HalfEdgeId, VertexId};
 use std::f64::consts::TAU;
 
-/// A chart without holes: its own triangles first, then the fans.
+/// A chart whose holes are filled: its own triangles first, then the fans.
 ///
 /// Vertices: those of the chart, then one centre per hole. Nodes of the quadratic elements: vertices of the chart
 /// `0..V`, mid-edge nodes of the chart `V..N`, centres, mid-edge nodes of the spokes.
 #[derive(Clone, Debug)]
-pub struct ClosedChart {
+pub struct FilledChart {
     triangles: Vec<[VertexId; 3]>,
     shapes: Vec<TriangleShape>,
     edges: EdgeTable,
-    own_triangles: usize,
-    own_vertices: usize,
-    own_edges: usize,
+    chart_triangles: usize,
+    chart_vertices: usize,
+    chart_edges: usize,
     holes: usize,
     outer: Vec<HalfEdgeId>,
     loops: Vec<Vec<HalfEdgeId>>,
     elimination: Vec<VertexId>,
 }
 
-impl ClosedChart {
-    /// Closes the holes of `chart`.
+impl FilledChart {
+    /// Fills the holes of `chart`.
     pub fn new(chart: &Chart) -> Self {
-        let own_vertices = chart.vertices().len();
+        let chart_vertices = chart.vertices().len();
         let mut triangles = chart.triangles().to_vec();
         let mut shapes = chart.shapes().to_vec();
         for (k, hole) in chart.holes().iter().enumerate() {
-            let centre = VertexId::at(own_vertices + k);
+            let centre = VertexId::at(chart_vertices + k);
             let lengths: Vec<f64> = hole.iter().map(|h| chart.length(*h)).collect();
             let longest = lengths.iter().fold(0.0_f64, |m, l| m.max(*l));
             let leg = (lengths.iter().sum::<f64>() / TAU).max(longest / 3.0_f64.sqrt());
@@ -47,15 +47,15 @@ impl ClosedChart {
                 shapes.push(TriangleShape { lengths: [*length, leg, leg] });
             }
         }
-        let vertices = own_vertices + chart.holes().len();
+        let vertices = chart_vertices + chart.holes().len();
         Self {
             elimination: elimination::of_vertices(&triangles, vertices, chart.outer()),
             edges: if chart.holes().is_empty() { chart.edges().clone() } else { EdgeTable::new(&triangles) },
             triangles,
             shapes,
-            own_triangles: chart.triangles().len(),
-            own_vertices,
-            own_edges: chart.edges().len(),
+            chart_triangles: chart.triangles().len(),
+            chart_vertices,
+            chart_edges: chart.edges().len(),
             holes: chart.holes().len(),
             outer: chart.outer().to_vec(),
             loops: chart.holes().to_vec(),
@@ -78,23 +78,23 @@ impl ClosedChart {
     }
 
     /// How many of the triangles belong to the chart.
-    pub fn own_triangles(&self) -> usize {
-        self.own_triangles
+    pub fn chart_triangles(&self) -> usize {
+        self.chart_triangles
     }
 
     /// How many of the vertices belong to the chart.
-    pub fn own_vertices(&self) -> usize {
-        self.own_vertices
+    pub fn chart_vertices(&self) -> usize {
+        self.chart_vertices
     }
 
     /// How many of the nodes belong to the chart: its vertices and its edges.
-    pub fn own_nodes(&self) -> usize {
-        self.own_vertices + self.own_edges
+    pub fn chart_nodes(&self) -> usize {
+        self.chart_vertices + self.chart_edges
     }
 
     /// The number of vertices, centres of fans included.
     pub fn vertex_count(&self) -> usize {
-        self.own_vertices + self.holes
+        self.chart_vertices + self.holes
     }
 
     /// The number of nodes, those of the fans included.
@@ -120,18 +120,28 @@ impl ClosedChart {
 
     /// The node at a vertex.
     pub fn vertex_node(&self, v: VertexId) -> usize {
-        if v.index() < self.own_vertices { v.index() } else { v.index() + self.own_edges }
+        if v.index() < self.chart_vertices { v.index() } else { v.index() + self.chart_edges }
+    }
+
+    /// Per node, whether it lies on the outer loop, where nothing moves.
+    pub fn outer_nodes(&self) -> Vec<bool> {
+        let mut is_outer = vec![false; self.node_count()];
+        for h in &self.outer {
+            is_outer[self.vertex_node(self.ends(*h)[0])] = true;
+            is_outer[self.mid_node(*h)] = true;
+        }
+        is_outer
     }
 
     /// The node at the centre of hole `k`.
     pub fn centre_node(&self, k: usize) -> usize {
-        self.own_nodes() + k
+        self.chart_nodes() + k
     }
 
     /// The node in the middle of the edge along `h`.
     pub fn mid_node(&self, h: HalfEdgeId) -> usize {
         let e = self.edges.edge(h).index();
-        if e < self.own_edges { self.own_vertices + e } else { self.vertex_count() + e }
+        if e < self.chart_edges { self.chart_vertices + e } else { self.vertex_count() + e }
     }
 
     /// The six nodes of a triangle: vertices, then the middles of the edges 01, 12, 20.
@@ -163,17 +173,17 @@ mod tests {
         let mesh = repair(&shapes::disk_with_holes(13, 2), &Default::default()).expect("a surface").mesh;
         let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart");
         let chart = &atlas.charts()[0];
-        let closed = ClosedChart::new(chart);
+        let closed = FilledChart::new(chart);
         let chi = closed.vertex_count() as i64 - closed.edges().len() as i64 + closed.triangles().len() as i64;
         assert_eq!(chi, 1, "a disk");
         let mut seen = vec![false; closed.node_count()];
         for f in 0..closed.triangles().len() {
             closed.nodes(f).into_iter().for_each(|n| seen[n] = true);
-            let own = f < closed.own_triangles();
-            assert!(!own || closed.nodes(f).iter().all(|n| *n < closed.own_nodes()));
+            let own = f < closed.chart_triangles();
+            assert!(!own || closed.nodes(f).iter().all(|n| *n < closed.chart_nodes()));
         }
         assert!(seen.iter().all(|s| *s));
-        for h in (0..3 * closed.own_triangles()).map(HalfEdgeId::at) {
+        for h in (0..3 * closed.chart_triangles()).map(HalfEdgeId::at) {
             assert_eq!(closed.edges().edge(h), chart.edges().edge(h));
         }
         assert!(closed.shapes().iter().all(|s| s.slack() > 0.0));

@@ -1,0 +1,77 @@
+//! The geometry of a triangle in space, as its stiffness matrix sees it: the first fundamental form.
+
+use super::element::{Barycentric, Element};
+use crate::mesh::TriangleShape;
+use crate::vec3::{Vec3, dot};
+
+/// The first fundamental form of a map x(xi, eta) from the reference triangle to space, at one point: all that the
+/// Laplacian of a surface depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirstForm {
+    /// x_xi . x_xi
+    pub e: f64,
+    /// x_xi . x_eta
+    pub f: f64,
+    /// x_eta . x_eta
+    pub g: f64,
+}
+
+impl FirstForm {
+    /// Of a flat triangle: the same at every point.
+    pub fn flat(shape: &TriangleShape) -> Self {
+        let [_, [length, _], [x, y]] = shape.in_plane();
+        Self { e: length * length, f: length * x, g: x * x + y * y }
+    }
+
+    /// Of a surface with these derivatives along xi and eta.
+    pub fn of_tangents([along_xi, along_eta]: [Vec3; 2]) -> Self {
+        Self { e: dot(along_xi, along_xi), f: dot(along_xi, along_eta), g: dot(along_eta, along_eta) }
+    }
+
+    /// Of the curved triangle whose nodes lie at `x` in space, at `l`.
+    pub fn of_nodes<E: Element<N>, const N: usize>(x: &[Vec3; N], l: Barycentric) -> Self {
+        Self::of_tangents(E::derivatives(x, l))
+    }
+
+    /// The area of the surface over that of the reference triangle's plane: the root of the determinant. Zero where
+    /// rounding makes that negative.
+    pub fn area_element(&self) -> f64 {
+        (self.e * self.g - self.f * self.f).max(0.0).sqrt()
+    }
+
+    /// The product of two gradients, given by their derivatives along xi and eta, times the area element: what is
+    /// integrated over the reference triangle. Not finite where the triangle is degenerate.
+    pub fn gradient_product(&self, p: [f64; 2], q: [f64; 2]) -> f64 {
+        (self.g * p[0] * q[0] - self.f * (p[0] * q[1] + p[1] * q[0]) + self.e * p[1] * q[1]) / self.area_element()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::element::{P1, P2};
+    use super::*;
+
+    #[test]
+    fn a_flat_triangle_has_the_same_form_by_lengths_and_by_nodes_of_any_element() {
+        let corners: [Vec3; 3] = [[1.0, 0.0, 2.0], [3.0, 1.0, 2.5], [0.5, 2.0, 1.0]];
+        let shape = TriangleShape::of(corners);
+        let by_lengths = FirstForm::flat(&shape);
+        let nodes = P2::NODES.map(|l| P1::interpolate(&corners, l));
+        for l in [[0.2, 0.3, 0.5], [1.0, 0.0, 0.0]] {
+            for form in [FirstForm::of_nodes::<P1, 3>(&corners, l), FirstForm::of_nodes::<P2, 6>(&nodes, l)] {
+                let off = [form.e - by_lengths.e, form.f - by_lengths.f, form.g - by_lengths.g];
+                assert!(off.iter().all(|d| d.abs() < 1e-13), "{form:?} {by_lengths:?}");
+                assert!((form.area_element() - 2.0 * shape.area()).abs() < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn a_stretched_gradient_shrinks() {
+        // x = 2 xi, y = eta: grad xi = (1/2, 0), and the area element is 2.
+        let form = FirstForm { e: 4.0, f: 0.0, g: 1.0 };
+        assert_eq!(form.gradient_product([1.0, 0.0], [1.0, 0.0]), 0.5);
+        assert_eq!(form.gradient_product([0.0, 1.0], [0.0, 1.0]), 2.0);
+        assert_eq!(form.gradient_product([1.0, 0.0], [0.0, 1.0]), 0.0);
+    }
+}

@@ -1,0 +1,325 @@
+//! One chart through the stages: linear map, quadratic map, untangling, certificate.
+
+use super::cut::{Attempt, Cutter};
+use crate::atlas::{CertifiedChart, Chart, Harmonic, LinearSummary, Provenance};
+use crate::certify::{self, CertifiedMap, PlanarMap, prove};
+use crate::decompose;
+use crate::fem::sparse;
+use crate::grid::GridPoint;
+use crate::map::boundary::{Boundary, Mids};
+use crate::map::filled::FilledChart;
+use crate::map::linear::{self, LinearMap, flatten_ear_arcs, linear_map};
+use crate::map::quadratic::{QuadraticMap, min_det, quadratic_map};
+use crate::measure::distortion;
+use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
+use crate::settings::{ChartSettings, Order};
+use crate::untangle::{Dirichlet, Untangled, untangle};
+
+/// A chart that is to be mapped, and what its map depends on: a value of its own, which needs neither the surface nor the
+/// other charts, and so can be done anywhere.
+#[derive(Clone, Debug)]
+pub struct ChartJob {
+    /// The chart.
+    pub chart: Chart,
+    /// What its map depends on.
+    pub settings: ChartSettings,
+}
+
+/// A chart with a linear map and, for quadratic elements, the harmonic map. The feasible start is certified
+/// already, so that there is always something to publish.
+#[derive(Clone, Debug)]
+pub struct MappedChart {
+    chart: Chart,
+    settings: ChartSettings,
+    maps: Maps,
+}
+
+/// The maps of a chart before untangling.
+#[derive(Clone, Debug)]
+pub(super) struct Maps {
+    filled: FilledChart,
+    linear: LinearMap,
+    start: Vec<GridPoint>,
+    pub(super) certified_start: CertifiedMap,
+    harmonic: Option<Result<QuadraticMap, sparse::Unsolvable>>,
+}
+
+impl Maps {
+    /// The conformal distortion that 99 % of the area does not exceed: for charts with holes in the harmonic map, where
+    /// there is one (untangling changes it little, and takes long where it is large), for others in the raised linear
+    /// map. Noise makes many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
+    pub(super) fn conformal_p99(&self, chart: &Chart) -> f64 {
+        let nodes = match &self.harmonic {
+            Some(Ok(map)) if !chart.holes().is_empty() => map.nodes(),
+            _ => &self.start,
+        };
+        distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]))
+    }
+}
+
+/// Why a chart cannot be mapped as a whole. All but the last mean: split it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MapError {
+    /// No linear map.
+    #[error(transparent)]
+    Linear(linear::Error),
+    /// The raised linear map is not one-to-one in double precision.
+    #[error("the chart is too distorted for one map: {0}; it must be split")]
+    Start(certify::Error),
+    /// The map stretches too much.
+    #[error("the area ratio {ratio:.2e} of the chart is above the largest one allowed; it must be split")]
+    Stretched {
+        /// The area ratio.
+        ratio: f64,
+        /// Per triangle, the logarithm of the area scale around it.
+        log_scales: Vec<f64>,
+    },
+    /// The map was not wanted any more.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+impl From<linear::Error> for MapError {
+    fn from(error: linear::Error) -> Self {
+        match error {
+            linear::Error::Interrupted(interrupted) => Self::Interrupted(interrupted),
+            error => Self::Linear(error),
+        }
+    }
+}
+
+impl MapError {
+    /// Per triangle, the logarithm of the area scale around it, where the chart has a map.
+    pub(super) fn log_scales(&self) -> Option<&[f64]> {
+        if let Self::Stretched { log_scales, .. } = self { Some(log_scales) } else { None }
+    }
+}
+
+impl ChartJob {
+    /// Maps the chart, and splits it where it touches itself in space, cannot be mapped, would be more distorted than the
+    /// settings allow, or where neither the disk nor the plane suits it but its parts, until every part is right. Ends
+    /// because parts are smaller, and single triangles map.
+    ///
+    /// # Errors
+    /// [`ChartError`].
+    pub fn map(self, monitor: &dyn Monitor) -> Result<Vec<MappedChart>, ChartError> {
+        let settings = self.settings;
+        let cutter = Cutter { settings: &settings, monitor };
+        let mut mapped = Vec::new();
+        let mut waiting = vec![self.chart];
+        while let Some(chart) = waiting.pop() {
+            let maps = match cutter.attempt(&chart)? {
+                Attempt::Mapped(maps) => {
+                    if let Some(parts) = cutter.parts(&chart, &maps)? {
+                        mapped.extend(parts.into_iter().map(|(chart, maps)| MappedChart { chart, settings, maps }));
+                        continue;
+                    }
+                    *maps
+                }
+                Attempt::Split(parts) => {
+                    waiting.extend(parts.into_iter().rev());
+                    continue;
+                }
+                // Its map is what it is.
+                Attempt::Single => map_within(&chart, settings.order, f64::INFINITY, monitor)?,
+            };
+            mapped.push(MappedChart { chart, settings, maps });
+        }
+        Ok(mapped)
+    }
+
+    /// Maps, untangles and certifies the chart, split where it must be: [`Self::map`], and [`MappedChart::untangle`] for
+    /// each part.
+    ///
+    /// # Errors
+    /// [`ChartError`].
+    pub fn run(self, monitor: &dyn Monitor) -> Result<Vec<CertifiedChart>, ChartError> {
+        let mut certified = Vec::new();
+        for mapped in self.map(monitor)? {
+            certified.extend(mapped.untangle(monitor)?);
+        }
+        Ok(certified)
+    }
+}
+
+impl MappedChart {
+    /// The chart.
+    pub fn chart(&self) -> &Chart {
+        &self.chart
+    }
+
+    /// Untangles the harmonic map and certifies the result; where that cannot be proven, the result is the feasible
+    /// start. A chart whose certified map is more distorted than the settings allow is split, and its parts are mapped
+    /// again: untangling changes areas. Ends because parts are smaller; a single triangle's map is what it is.
+    ///
+    /// # Errors
+    /// [`ChartError`].
+    pub fn untangle(self, monitor: &dyn Monitor) -> Result<Vec<CertifiedChart>, ChartError> {
+        let settings = self.settings;
+        let largest = settings.decompose.max_area_ratio;
+        let mut certified = Vec::new();
+        let mut waiting = vec![self];
+        while let Some(MappedChart { chart, maps, .. }) = waiting.pop() {
+            let proven = untangle_and_certify(maps, monitor)?;
+            let ratio = distortion::area_ratio(&chart, &proven.map);
+            let parts = if ratio > largest {
+                let scales = distortion::log_scales(&chart, &proven.map);
+                decompose::split(&chart, Some(&scales), &settings.decompose, monitor)?
+            } else {
+                None
+            };
+            let Some(parts) = parts else {
+                certified.push(proven.of(chart, ratio));
+                continue;
+            };
+            for chart in parts.into_iter().rev() {
+                waiting.extend(ChartJob { chart, settings }.map(monitor)?.into_iter().rev());
+            }
+        }
+        Ok(certified)
+    }
+}
+
+/// Maps, untangles and certifies a chart as it is, however much that distorts it.
+///
+/// # Errors
+/// [`MapError`]: the chart must be split, as [`ChartJob::run`] does.
+pub fn parametrize_chart(chart: Chart, order: Order) -> Result<CertifiedChart, MapError> {
+    let maps = map_within(&chart, order, f64::INFINITY, &NoMonitor)?;
+    let proven = untangle_and_certify(maps, &NoMonitor)?;
+    let ratio = distortion::area_ratio(&chart, &proven.map);
+    Ok(proven.of(chart, ratio))
+}
+
+/// Why a chart has no map, split or not.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ChartError {
+    /// A single triangle does not map.
+    #[error(transparent)]
+    Map(MapError),
+    /// A part is no chart: a fault of planish.
+    #[error(transparent)]
+    Split(decompose::Error),
+    /// The map was not wanted any more.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+impl From<MapError> for ChartError {
+    fn from(error: MapError) -> Self {
+        match error {
+            MapError::Interrupted(interrupted) => interrupted.into(),
+            error => Self::Map(error),
+        }
+    }
+}
+
+impl From<decompose::Error> for ChartError {
+    fn from(error: decompose::Error) -> Self {
+        match error {
+            decompose::Error::Interrupted(interrupted) => interrupted.into(),
+            error => Self::Split(error),
+        }
+    }
+}
+
+/// Maps `chart` linearly and, for quadratic elements, harmonically. One whose certified map would exceed `max_area_ratio`
+/// need not be mapped.
+///
+/// # Errors
+/// [`MapError`]: the chart must be split, or nobody waits for the map any more.
+pub(super) fn map_within(
+    chart: &Chart,
+    order: Order,
+    max_area_ratio: f64,
+    monitor: &dyn Monitor,
+) -> Result<Maps, MapError> {
+    let checkpoint = Checkpoint::new(monitor);
+    let size = chart.triangles().len();
+    let filled = FilledChart::new(chart);
+    checkpoint.after(size)?;
+    let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
+    let mut boundary = Boundary::circle(&filled, mids);
+    let linear = linear_map(&filled, &boundary, monitor)?;
+    checkpoint.end()?;
+    flatten_ear_arcs(&filled, &linear, &mut boundary);
+    let start = linear.degree_elevated(&filled, &boundary);
+    let centres = (0..filled.loops().len()).map(|k| start[filled.centre_node(k)]).collect();
+    let certified_start = prove(planar(&filled, &start, centres)).map_err(MapError::Start)?;
+    checkpoint.after(size)?;
+    let ratio = distortion::area_ratio(chart, &certified_start);
+    let within = |ratio: f64, bound: f64| {
+        let stretched = || MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) };
+        if ratio > bound { Err(stretched()) } else { Ok(()) }
+    };
+    within(ratio, if order == Order::Linear { max_area_ratio } else { HOPELESS * max_area_ratio })?;
+    let harmonic = match (order == Order::Quadratic).then(|| quadratic_map(&filled, &boundary, monitor)) {
+        None => None,
+        Some(Ok(map)) => Some(Ok(map)),
+        Some(Err(sparse::Error::Unsolvable(unsolvable))) => Some(Err(unsolvable)),
+        Some(Err(sparse::Error::Interrupted(interrupted))) => return Err(interrupted.into()),
+    };
+    if let Some(Ok(map)) = &harmonic {
+        let of_harmonic = distortion::area_ratio_of_nodes(chart, |f| filled.nodes(f).map(|n| map.nodes()[n]));
+        within(ratio.sqrt() * of_harmonic.sqrt(), max_area_ratio)?;
+    }
+    checkpoint.end()?;
+    Ok(Maps { filled, linear, start, certified_start, harmonic })
+}
+
+/// A chart whose linear map is above the largest area ratio by this factor is split at once. Below it the harmonic map
+/// is asked, too, as slivers stretch linear maps more: a ratio is foretold, halfway between those of both. That is
+/// right within a decade mostly, and saves untangling; what decides is the certified map.
+const HOPELESS: f64 = 10.0;
+
+/// A certified map, and how it was found.
+struct ProvenMap {
+    map: CertifiedMap,
+    start: CertifiedMap,
+    provenance: Provenance,
+}
+
+impl ProvenMap {
+    /// The map as that of `chart`; `area_ratio` is its own.
+    fn of(self, chart: Chart, area_ratio: f64) -> CertifiedChart {
+        CertifiedChart::new(chart, self.map, self.start, self.provenance, area_ratio)
+    }
+}
+
+/// Untangles the harmonic map, if there is one, and certifies the result; where that cannot be proven, the result is the
+/// feasible start.
+fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, Interrupted> {
+    let Maps { filled, linear, start, certified_start, harmonic } = maps;
+    let linear =
+        LinearSummary { folded: linear.folded(), edges_changed: linear.edges_changed(), method: linear.method() };
+    let (harmonic, unsolved) = match harmonic {
+        None => (None, None),
+        Some(Err(unsolved)) => (None, Some(unsolved)),
+        Some(Ok(map)) => (Some(map), None),
+    };
+    let Some(map) = harmonic else {
+        let provenance = Provenance { linear, harmonic: None, untangle: None, unsolved };
+        return Ok(ProvenMap { map: certified_start.clone(), start: certified_start, provenance });
+    };
+    let mut invalid = vec![false; filled.chart_triangles()];
+    map.invalid().iter().for_each(|f| invalid[f.index()] = true);
+    let harmonic = Some(Harmonic { invalid, det_min: min_det(&filled, &map) });
+    let energy = Dirichlet::new(filled.shapes());
+    let Untangled { nodes, hole_centres, mut report } = untangle(&filled, &energy, &start, &map, monitor)?;
+    Checkpoint::new(monitor).end()?;
+    let certified = match prove(planar(&filled, &nodes, hole_centres)) {
+        Ok(certified) => certified,
+        Err(_) => {
+            report = report.of_start(&filled, &start, &map);
+            certified_start.clone()
+        }
+    };
+    let provenance = Provenance { linear, harmonic, untangle: Some(report), unsolved };
+    Ok(ProvenMap { map: certified, start: certified_start, provenance })
+}
+
+/// The part of a map that is published: the chart without its fans.
+fn planar(filled: &FilledChart, nodes: &[GridPoint], hole_centres: Vec<GridPoint>) -> PlanarMap {
+    let cells = (0..filled.chart_triangles()).map(|f| filled.nodes(f).map(|n| n as u32)).collect();
+    PlanarMap { cells, nodes: nodes[..filled.chart_nodes()].to_vec(), hole_centres }
+}

@@ -1,0 +1,114 @@
+use super::*;
+use crate::atlas::{CertifiedChart, Chart};
+use crate::map::natural;
+use crate::monitor::NoMonitor;
+use crate::settings::{ChartSettings, Order};
+use crate::{repair, shapes};
+
+/// A surface as one chart.
+fn whole(soup: &TriangleSoup) -> Chart {
+    let mesh = repair(soup, &Default::default()).expect("repairs").mesh;
+    decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").into_charts().remove(0)
+}
+
+/// The job to map a chart, without features.
+fn job(chart: Chart, max_area_ratio: f64) -> ChartJob {
+    let decompose = decompose::Settings { feature_angle: None, max_area_ratio, ..Default::default() };
+    ChartJob { chart, settings: ChartSettings { order: Order::Quadratic, decompose } }
+}
+
+/// The parts into which one chart of all falls before it is untangled.
+fn parts(soup: &TriangleSoup) -> Vec<Chart> {
+    let mapped = job(whole(soup), 1e6).map(&NoMonitor).expect("maps");
+    mapped.iter().map(|m| m.chart().clone()).collect()
+}
+
+#[test]
+fn a_tube_of_long_facets_becomes_strips_that_unroll_and_a_fine_one_stays_whole() {
+    let strips = parts(&shapes::tube(36, 1, 200.0));
+    assert!(strips.len() >= 2, "{}", strips.len());
+    for strip in &strips {
+        assert!(strip.holes().is_empty());
+        let natural = natural::natural(strip, f64::MAX, &NoMonitor).expect("no one interrupts").expect("it unrolls");
+        assert!(natural.distortion.conformal_p99 < 4.0, "{:?}", natural.distortion);
+    }
+    let whole = parts(&shapes::tube(36, 6, 3.0));
+    assert_eq!(whole.len(), 1, "nothing stretches there");
+}
+
+/// Four walls of two facets each, and a lid: its corners keep it from being unrolled in one part.
+fn open_box(height: f64) -> TriangleSoup {
+    let corner = |k: u32| [f64::from(k & 1), f64::from(k >> 1 & 1), height * f64::from(k >> 2)];
+    let quads: [[u32; 4]; 5] = [[0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6], [4, 5, 7, 6]];
+    let halves = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+    TriangleSoup::new((0..8).map(corner).collect(), halves.collect()).expect("sound")
+}
+
+#[test]
+fn a_tall_box_falls_into_parts_that_unroll_and_a_low_one_stays_whole() {
+    let walls = parts(&open_box(100.0));
+    assert!((2..=3).contains(&walls.len()), "{}", walls.len());
+    let unrolls = |part| natural::natural(part, f64::MAX, &NoMonitor).expect("no one interrupts").is_some();
+    assert!(walls.iter().all(unrolls));
+    let whole = parts(&open_box(12.0));
+    assert_eq!(whole.len(), 1, "it stretches, but no more than others");
+}
+
+#[test]
+fn what_untangling_stretches_too_much_is_split() {
+    let largest = 5e5;
+    let disk = whole(&shapes::bent_disk(32, 0.45, 1.0));
+    let triangles = disk.triangles().len();
+    let mapped = job(disk, largest).map(&NoMonitor).expect("maps");
+    let [mapped] = &mapped[..] else { panic!("{} parts", mapped.len()) };
+    let ratio = |done: &CertifiedChart| done.distortion().area_ratio;
+    let as_it_is = parametrize_chart(mapped.chart().clone(), Order::Quadratic).expect("maps");
+    assert!(ratio(&as_it_is) > largest, "neither linear nor harmonic map foretell it");
+    let finished = mapped.clone().untangle(&NoMonitor).expect("maps");
+    assert!(finished.len() > 1 && finished.iter().all(|f| ratio(f) <= largest));
+    assert_eq!(finished.iter().map(|f| f.chart().triangles().len()).sum::<usize>(), triangles);
+}
+
+#[test]
+fn jobs_need_neither_each_other_nor_the_surface() {
+    let soup = shapes::sphere(12);
+    let settings = Settings::default();
+    let atlas = parametrize(&soup, &settings, &NoMonitor).expect("an atlas");
+    let plan = Plan::new(repair(&soup, &settings.repair).expect("a surface").mesh, &settings, &NoMonitor);
+    let Plan { mesh, jobs, .. } = plan.expect("charts");
+    let size = settings.size;
+    drop(soup);
+    // The last one first; their results in the order of the jobs.
+    let mut done: Vec<Vec<CertifiedChart>> =
+        jobs.into_iter().rev().map(|job| job.run(&NoMonitor).expect("maps")).collect();
+    done.reverse();
+    let gathered = CertifiedAtlas::gather(mesh, done.concat(), size).expect("an atlas");
+    let maps = |atlas: &CertifiedAtlas| atlas.charts().iter().map(|c| c.map().map().clone()).collect::<Vec<_>>();
+    assert!(maps(&gathered) == maps(&atlas) && gathered.charts().len() >= 2);
+    assert_eq!(gathered.seams().curves(), atlas.seams().curves());
+    let ids = gathered.charts().iter().map(|c| c.id().index());
+    assert!(ids.eq(0..gathered.charts().len()));
+}
+
+#[test]
+fn charts_that_do_not_hold_every_triangle_once_are_no_atlas() {
+    let atlas = parametrize(&shapes::sphere(6), &Settings::default(), &NoMonitor).expect("an atlas");
+    let (mesh, charts) = (atlas.mesh(), atlas.charts());
+    let gather = |charts: &[CertifiedChart]| CertifiedAtlas::gather(mesh.clone(), charts.to_vec(), None).map(|_| ());
+    assert_eq!(gather(charts), Ok(()));
+    let triangles = |c: usize| charts[c].chart().triangles().len();
+    let missing = gather(&charts[1..]).expect_err("one is missing");
+    assert!(matches!(missing, GatherError::Missing { count, .. } if count == triangles(0)), "{missing}");
+    let twice = gather(&[charts, &charts[..1]].concat()).expect_err("one is there twice");
+    assert!(matches!(twice, GatherError::Twice { first: 0, second, .. } if second == charts.len()), "{twice}");
+    let other = parametrize(&shapes::sphere(9), &Settings::default(), &NoMonitor).expect("an atlas");
+    let foreign = gather(&[&charts[..1], &other.charts()[1..]].concat()).expect_err("of another surface");
+    assert!(matches!(foreign, GatherError::Foreign { part: 1, .. }), "{foreign}");
+}
+
+#[test]
+fn the_reason_why_there_is_no_atlas_is_kept() {
+    let flat = TriangleSoup::new(vec![[0.0; 3], [1.0, 0.0, 0.0]], vec![[0, 1, 1]]).expect("sound");
+    let error = parametrize(&flat, &Settings::default(), &NoMonitor).expect_err("nothing is left");
+    assert!(matches!(error, Error::Repair(repair::Error::OnlyDegenerate { .. })), "{error}");
+}

@@ -1,0 +1,204 @@
+//! Is a surface worth an atlas? Faces of volume elements are none: non-manifold edges cut them into sheets of one or two
+//! triangles, each of which would be a chart.
+//!
+//! A file may hold such faces beside a surface. So each *component* is judged: what is connected through edges, also those of
+//! three and more triangles. Of those with the most sheets so many are refused that the rest is few enough.
+
+use super::{Error, Repaired};
+use crate::mesh::SurfaceMesh;
+use crate::topology::union_find::UnionFind;
+use crate::topology::{FaceId, HalfEdgeId, VertexId};
+use std::collections::BTreeSet;
+
+/// Sheets that non-manifold edges may cut a surface into. Each is a chart at least: the 6480 of the faces of all tetrahedra
+/// in a grid of 8 x 8 x 8 cubes take 8 seconds, and the cost grows with the square of their number.
+pub(super) const MAX_SHEETS: usize = 10_000;
+
+/// The same, for sheets of fewer than [`TINY_SHEET`] triangles on average: faces of volume elements have one or two, and
+/// an atlas of them is of no use. A network of faults or a foam has more.
+pub(super) const MAX_TINY_SHEETS: usize = 1_000;
+
+/// See [`MAX_TINY_SHEETS`].
+pub(super) const TINY_SHEET: usize = 4;
+
+/// So many of the vertices at which sheets meet are named.
+const NAMED: usize = 8;
+
+/// A component of which no atlas is made, while others get one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RefusedComponent {
+    /// Its number among the components (what is connected through edges, also those of three and more triangles), in the
+    /// order of their first triangles.
+    pub component: usize,
+    /// Its triangles.
+    pub triangles: usize,
+    /// The position in the input of the first of them.
+    pub first_triangle: u32,
+    /// Why.
+    pub error: Error,
+}
+
+/// A surface worth an atlas, and what was left out of it.
+#[derive(Clone, Debug)]
+pub struct Accepted {
+    /// The surface.
+    pub mesh: SurfaceMesh,
+    /// The components that are not in it.
+    pub refused: Vec<RefusedComponent>,
+}
+
+impl Repaired {
+    /// The components of which no atlas can be made.
+    ///
+    /// # Errors
+    /// [`Error::VolumeElements`], where no other is left.
+    pub fn refused(&self) -> Result<Vec<RefusedComponent>, Error> {
+        Ok(self.judged()?.refused)
+    }
+
+    /// The surface without the components of which no atlas can be made.
+    ///
+    /// # Errors
+    /// [`Error::VolumeElements`], where no other is left.
+    pub fn accepted(self) -> Result<Accepted, Error> {
+        let Judged { kept, refused } = self.judged()?;
+        let mesh = match kept {
+            None => self.mesh,
+            Some(kept) => self.mesh.restricted(&kept),
+        };
+        Ok(Accepted { mesh, refused })
+    }
+
+    fn judged(&self) -> Result<Judged, Error> {
+        let census = self.mesh.census();
+        let sheets = census.components.saturating_sub(self.raw.components);
+        if !are_too_many(sheets, census.triangles) {
+            return Ok(Judged { kept: None, refused: vec![] });
+        }
+        let components = Components::new(&self.mesh);
+        let refused = components.refused();
+        if refused.len() == components.all.len() {
+            let vertices = self.report.split_vertices.first.clone();
+            let (triangles, nonmanifold_edges) = (census.triangles, census.nonmanifold_edges);
+            return Err(Error::VolumeElements { sheets, triangles, nonmanifold_edges, vertices });
+        }
+        let is_kept = |f: &usize| !refused.contains(&components.of_face[*f]);
+        let kept = (0..components.of_face.len()).filter(is_kept).map(FaceId::at).collect();
+        let refused = refused.iter().map(|number| components.refusal(*number, &self.mesh)).collect();
+        Ok(Judged { kept: Some(kept), refused })
+    }
+}
+
+/// Which faces are worth an atlas (all, where none are named), and which components are not.
+struct Judged {
+    kept: Option<Vec<FaceId>>,
+    refused: Vec<RefusedComponent>,
+}
+
+/// Whether nobody wants charts of so many sheets beyond one for each component.
+fn are_too_many(sheets: usize, triangles: usize) -> bool {
+    let are_tiny = triangles < TINY_SHEET * sheets;
+    sheets > if are_tiny { MAX_TINY_SHEETS } else { MAX_SHEETS }
+}
+
+/// The components of a surface.
+struct Components {
+    /// Per face, the number of its component.
+    of_face: Vec<usize>,
+    all: Vec<Component>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Component {
+    sheets: usize,
+    triangles: usize,
+    first: Option<FaceId>,
+    nonmanifold_edges: usize,
+    /// The first welded vertices at which its sheets meet.
+    vertices: BTreeSet<u32>,
+}
+
+impl Components {
+    fn new(mesh: &SurfaceMesh) -> Self {
+        let mut connected = UnionFind::new(mesh.triangles().len());
+        for (_, sides) in mesh.edges().iter() {
+            for pair in sides.windows(2) {
+                connected.unite(pair[0].face().index(), pair[1].face().index());
+            }
+        }
+        let (sheet_of, sheets) = connected.labels();
+        // Repair gave each sheet that met others an edge of its own: they are the same between welded vertices.
+        let met = met_edges(mesh);
+        for sides in &met {
+            for pair in sides.windows(2) {
+                connected.unite(pair[0].face().index(), pair[1].face().index());
+            }
+        }
+        let (component_of, count) = connected.labels();
+        let of_face: Vec<usize> = component_of.iter().map(|c| *c as usize).collect();
+        let mut all = vec![Component::default(); count];
+        let mut seen = vec![false; sheets];
+        for (face, &number) in of_face.iter().enumerate() {
+            let component = &mut all[number];
+            component.triangles += 1;
+            component.first.get_or_insert(FaceId::at(face));
+            component.sheets += usize::from(!std::mem::replace(&mut seen[sheet_of[face] as usize], true));
+        }
+        for sides in met.iter().filter(|sides| sides.len() > 2) {
+            let component = &mut all[of_face[sides[0].face().index()]];
+            component.nonmanifold_edges += 1;
+            component.vertices.extend(welded_ends(mesh, sides[0]));
+            while component.vertices.len() > NAMED {
+                component.vertices.pop_last();
+            }
+        }
+        Self { of_face, all }
+    }
+
+    /// The numbers of so many of the components with the most sheets that the others are few enough; ascending.
+    fn refused(&self) -> BTreeSet<usize> {
+        let beyond = |number: usize| self.all[number].sheets - 1;
+        let mut by_sheets: Vec<usize> = (0..self.all.len()).collect();
+        by_sheets.sort_by_key(|number| std::cmp::Reverse(beyond(*number)));
+        let mut sheets: usize = by_sheets.iter().map(|number| beyond(*number)).sum();
+        let mut triangles: usize = self.all.iter().map(|c| c.triangles).sum();
+        let mut refused = BTreeSet::new();
+        for number in by_sheets {
+            if !are_too_many(sheets, triangles) {
+                break;
+            }
+            sheets -= beyond(number);
+            triangles -= self.all[number].triangles;
+            refused.insert(number);
+        }
+        refused
+    }
+
+    fn refusal(&self, number: usize, mesh: &SurfaceMesh) -> RefusedComponent {
+        let Component { sheets, triangles, first, nonmanifold_edges, ref vertices } = self.all[number];
+        let vertices = vertices.iter().copied().collect();
+        RefusedComponent {
+            component: number,
+            triangles,
+            first_triangle: first.map_or(0, |f| mesh.source_triangle(f.index())),
+            error: Error::VolumeElements { sheets: sheets - 1, triangles, nonmanifold_edges, vertices },
+        }
+    }
+}
+
+/// The welded vertices at both ends of a half-edge, ascending.
+fn welded_ends(mesh: &SurfaceMesh, h: HalfEdgeId) -> [u32; 2] {
+    let vertex = |h: HalfEdgeId| -> VertexId { mesh.triangles()[h.face().index()][h.side()] };
+    let [a, b] = [h, h.next()].map(|h| mesh.welded_vertex(vertex(h)));
+    [a.min(b), a.max(b)]
+}
+
+/// The open edges between the same two welded vertices, where there are several.
+fn met_edges(mesh: &SurfaceMesh) -> Vec<Vec<HalfEdgeId>> {
+    let open = mesh.edges().iter().filter(|(_, sides)| sides.len() == 1);
+    let mut keyed: Vec<([u32; 2], HalfEdgeId)> =
+        open.map(|(_, sides)| (welded_ends(mesh, sides[0]), sides[0])).collect();
+    keyed.sort_unstable();
+    let several = keyed.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1);
+    several.map(|same| same.iter().map(|(_, h)| *h).collect()).collect()
+}

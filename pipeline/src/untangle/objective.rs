@@ -1,0 +1,103 @@
+//! What untangling minimises.
+
+use crate::fem::element::{self, Element, P2};
+use crate::fem::jacobian::P2Nodes;
+use crate::mesh::TriangleShape;
+use crate::topology::FaceId;
+
+/// The scalar unknowns of a triangle: u and v at six nodes, u0, v0, u1, and so on.
+pub(crate) const SCALARS: usize = 12;
+
+/// Gradient and Hessian of an objective on one triangle, with respect to its scalar unknowns.
+#[derive(Clone, Copy, Debug)]
+pub struct LocalModel {
+    /// The gradient.
+    pub gradient: [f64; SCALARS],
+    /// The Hessian, or a positive semidefinite matrix in place of it. Only the lower triangle counts.
+    pub hessian: [[f64; SCALARS]; SCALARS],
+}
+
+/// An objective: a sum over the triangles of a chart, each summand a smooth function, never negative, of the uv_of of
+/// the triangle's six nodes. Newton's method and the barrier know nothing else of it.
+pub trait Objective {
+    /// The summand of a triangle whose nodes lie at `x`.
+    fn value(&self, face: FaceId, x: &P2Nodes) -> f64;
+
+    /// Gradient and curvature of that summand. The matrix in place of the Hessian must be positive semidefinite: where
+    /// the summand is not convex, what makes it so is left out.
+    fn model(&self, face: FaceId, x: &P2Nodes) -> LocalModel;
+
+    /// The order of magnitude of the summand of a triangle that covers `area` in the plane: the unit in which penalties
+    /// are weighed against the objective.
+    fn typical(&self, area: f64) -> f64;
+}
+
+/// The Dirichlet energy 1/2 int |grad u|^2 + |grad v|^2 over the surface, whose minimiser is harmonic.
+#[derive(Clone, Copy, Debug)]
+pub struct Dirichlet<'a> {
+    shapes: &'a [TriangleShape],
+}
+
+impl<'a> Dirichlet<'a> {
+    /// Of maps of the triangles with these shapes.
+    pub fn new(shapes: &'a [TriangleShape]) -> Self {
+        Self { shapes }
+    }
+
+    fn stiffness(&self, face: FaceId) -> [[f64; 6]; 6] {
+        P2::stiffness(&self.shapes[face.index()])
+    }
+}
+
+impl Objective for Dirichlet<'_> {
+    fn value(&self, face: FaceId, x: &P2Nodes) -> f64 {
+        element::energy(&self.stiffness(face), x)
+    }
+
+    fn model(&self, face: FaceId, x: &P2Nodes) -> LocalModel {
+        let stiffness = self.stiffness(face);
+        // Differences to the first node, so that small triangles lose no digits.
+        let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
+        let slope = |i: usize| (0..6).map(|n| stiffness[i / 2][n] * d[n][i % 2]).sum();
+        let mut hessian = [[0.0; SCALARS]; SCALARS];
+        for m in 0..6 {
+            for n in 0..=m {
+                hessian[2 * m][2 * n] = stiffness[m][n];
+                hessian[2 * m + 1][2 * n + 1] = stiffness[m][n];
+            }
+        }
+        LocalModel { gradient: std::array::from_fn(slope), hessian }
+    }
+
+    /// Half the area: that of an area-preserving conformal map is the area.
+    fn typical(&self, area: f64) -> f64 {
+        0.5 * area
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::fem::jacobian::samples::{X, Y, moved};
+
+    /// That gradient and Hessian are the derivatives of the value at X along Y, and the Hessian is no smaller than the
+    /// true one.
+    pub(in super::super) fn check_derivatives(objective: &impl Objective) {
+        let face = FaceId(0);
+        let model = objective.model(face, &X);
+        let direction: Vec<f64> = Y.as_flattened().to_vec();
+        let h = 1e-4;
+        let [low, mid, high] = [-h, 0.0, h].map(|t| objective.value(face, &moved(t)));
+        let slope: f64 = (0..SCALARS).map(|i| model.gradient[i] * direction[i]).sum();
+        assert!((slope - (high - low) / (2.0 * h)).abs() < 1e-7 * slope.abs().max(1.0));
+        let entry = |i: usize, j: usize| model.hessian[i.max(j)][i.min(j)];
+        let row = |i: usize| (0..SCALARS).map(|j| direction[i] * entry(i, j) * direction[j]).sum::<f64>();
+        let curvature: f64 = (0..SCALARS).map(row).sum();
+        assert!(curvature >= (high - 2.0 * mid + low) / (h * h) - 1e-5 && curvature >= 0.0);
+    }
+
+    #[test]
+    fn the_model_of_the_dirichlet_energy_holds_its_derivatives() {
+        check_derivatives(&Dirichlet::new(&[TriangleShape { lengths: [1.0, 0.7, 0.9] }]));
+    }
+}
