@@ -80,7 +80,7 @@ pub struct Reason {
     pub message: String,
     /// Where: line, byte, triangle or vertex.
     #[serde(rename = "where")]
-    pub place: Option<String>,
+    pub location: Option<String>,
 }
 
 impl Reason {
@@ -90,8 +90,8 @@ impl Reason {
     }
 
     /// A reason with its place, where there is one. Both may quote the file.
-    pub fn at(code: Code, message: impl ToString, place: Option<String>) -> Self {
-        Self { code, message: printable(&message.to_string()), place: place.map(|place| printable(&place)) }
+    pub fn at(code: Code, message: impl ToString, location: Option<String>) -> Self {
+        Self { code, message: printable(&message.to_string()), location: location.map(|location| printable(&location)) }
     }
 
     /// The state that this reason leads to.

@@ -6,6 +6,7 @@ use crate::outcome::{Abort, Code, Reason};
 use crate::report::{
     self, CertifiedFacts, Decomposition, Facts, Input, Output, RefusedComponent, Report, SurfaceFacts,
 };
+use crate::result_files;
 use crate::settings::{self, Settings};
 use planish_core::atlas::Atlas;
 use planish_core::fem::sparse;
@@ -178,16 +179,13 @@ fn warn_if_unsolved(certified: &CertifiedChart) {
 /// Encodes what ParaView shows.
 fn encode(atlas: &CertifiedAtlas) -> Result<Files, Reason> {
     let files = [
-        ("surface.vtu", vtu::surface(atlas).map_err(not_encoded)?),
-        ("param.vtu", vtu::param(atlas).map_err(not_encoded)?),
-        ("seams.vtp", vtp::seams(atlas.mesh(), atlas.seams()).map_err(not_encoded)?),
-        ("atlas.vtm", vtm::blocks(&ATLAS)),
+        (result_files::SURFACE, vtu::surface(atlas).map_err(not_encoded)?),
+        (result_files::PARAM, vtu::param(atlas).map_err(not_encoded)?),
+        (result_files::SEAMS, vtp::seams(atlas.mesh(), atlas.seams()).map_err(not_encoded)?),
+        (result_files::ATLAS_VTM, vtm::blocks(&result_files::ATLAS_BLOCKS)),
     ];
     Ok(files.map(|(name, content)| (name.to_owned(), content)).into())
 }
-
-/// The blocks of atlas.vtm.
-const ATLAS: [(&str, &str); 3] = [("surface", "surface.vtu"), ("param", "param.vtu"), ("seams", "seams.vtp")];
 
 fn not_encoded(error: impl std::fmt::Display) -> Reason {
     Reason::new(Code::Internal, format!("the result cannot be encoded: {error}"))

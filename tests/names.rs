@@ -103,7 +103,7 @@ fn assert_results(out: &Path, more: &[&str]) {
             assert_eq!(hooks["commands"][0]["command"][4], *name.to_string_lossy());
         } else {
             let reason = report.reason.expect("a reason");
-            assert_eq!((reason.code, reason.place.as_deref()), (Code::Malformed, Some("line 3")), "{name:?}");
+            assert_eq!((reason.code, reason.location.as_deref()), (Code::Malformed, Some("line 3")), "{name:?}");
             assert_eq!(names(&out.join(&name)).len(), 1);
         }
     }

@@ -35,7 +35,7 @@ fn refusals_say_where_and_what_to_do() {
         let (ended, report) = out.run_bytes(name, bytes);
         let reason = report.reason.expect("a reason");
         assert_eq!((ended.code, report.status, reason.code), (Some(1), Status::Refused, code), "{name}");
-        assert_eq!(reason.place.as_deref(), place, "{name}: {}", reason.message);
+        assert_eq!(reason.location.as_deref(), place, "{name}: {}", reason.message);
         assert!(ended.err.contains(&reason.message) && ended.err.contains(name), "{}", ended.err);
         assert_eq!(std::fs::read_dir(out.of(name)).expect("a folder").count(), 1, "nothing but the report");
         assert!(report.outputs.is_empty());

@@ -82,36 +82,44 @@ fn read_here(in_flight: Arc<InFlight>, next: &Next) {
     };
     let mut facts = Facts::new(input(&in_flight.job, content.as_deref().ok()));
     let folder = Folder::of_job(&in_flight.job);
-    let decoded = in_flight.compute(Stage::Read, |_| {
-        let bytes = content?;
-        facts.input.blake3 = Some(blake3::hash(&bytes).to_hex().to_string());
-        match up_to_date(&in_flight, &facts.input, &folder) {
-            Some(older) => Ok(Err(older)),
-            None => {
-                let content = input::decode(&in_flight.job.path, &bytes, &in_flight.settings, &folder);
-                let content = content.map_err(|refusal| {
-                    facts.content = refusal.notes.map(|notes| *notes);
-                    refusal.reason
-                })?;
-                input::check_memory(&content.soup, &in_flight.settings)?;
-                Ok(Ok(content))
-            }
-        }
-    });
+    let decoded = in_flight.compute(Stage::Read, |_| decode(&in_flight, &content?, &mut facts, &folder));
     in_flight.job.set_beside(folder.asked());
     facts.input.beside = folder.read();
     match decoded {
-        Ok(Ok(Content { soup, notes })) => {
+        Ok(Decoded::Fresh(Content { soup, notes })) => {
             warn_of_doubts(&in_flight, &notes);
             facts.content = Some(notes);
             hand_on(&next.soups, Soup { in_flight, facts, soup });
         }
-        Ok(Err(older)) => leave(in_flight.clone(), older, next),
+        Ok(Decoded::UpToDate(older)) => leave(in_flight.clone(), *older, next),
         Err(Abort::For(reason)) if reason.code == Code::MissingFile && in_flight.job.since.is_some() => {
             in_flight.end(End::Waiting(reason));
         }
         Err(why) => hand_on(&next.finished, Finished::Abort(in_flight, Box::new(facts), why)),
     }
+}
+
+/// What came of the bytes of an input.
+enum Decoded {
+    /// A soup, with what else the file holds.
+    Fresh(Content),
+    /// The report of an older result: nothing is to be done.
+    UpToDate(Box<Report>),
+}
+
+/// Decodes the bytes of an input, unless an older result is up to date. What becomes known on the way is a fact even where
+/// the input is refused.
+fn decode(in_flight: &InFlight, bytes: &[u8], facts: &mut Facts, folder: &Folder) -> Result<Decoded, Abort> {
+    facts.input.blake3 = Some(blake3::hash(bytes).to_hex().to_string());
+    if let Some(older) = up_to_date(in_flight, &facts.input, folder) {
+        return Ok(Decoded::UpToDate(Box::new(older)));
+    }
+    let content = input::decode(&in_flight.job.path, bytes, &in_flight.settings, folder).map_err(|refusal| {
+        facts.content = refusal.notes.map(|notes| *notes);
+        refusal.reason
+    })?;
+    input::check_memory(&content.soup, &in_flight.settings)?;
+    Ok(Decoded::Fresh(content))
 }
 
 /// The older result, where nothing is to be done.

@@ -159,12 +159,28 @@ fn try_to_put(ready: &mut Ready) -> Result<bool, PublishError> {
     }
 }
 
+/// A result that could not be put in place, for a reason that passes.
+struct Parked {
+    ready: Ready,
+    /// How often that was tried in vain.
+    failures: u32,
+    /// When it is tried again.
+    then: Instant,
+}
+
+impl Parked {
+    /// One that has failed so often, just now.
+    fn new(ready: Ready, failures: u32) -> Self {
+        Self { ready, failures, then: Instant::now() + passing::pause(failures) }
+    }
+}
+
 /// Tries again to put results in place, in steps that grow, until nobody wants them or no more come.
 pub(super) fn look_after(parked: Receiver<Ready>, chain: &Sender<Chained>) {
-    let mut waiting: Vec<(Ready, u32, Instant)> = Vec::new();
+    let mut waiting: Vec<Parked> = Vec::new();
     loop {
         match parked.recv_timeout(LOOK) {
-            Ok(ready) => waiting.push((ready, 1, Instant::now() + passing::pause(1))),
+            Ok(ready) => waiting.push(Parked::new(ready, 1)),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) if waiting.is_empty() => return,
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LOOK),
@@ -173,22 +189,19 @@ pub(super) fn look_after(parked: Receiver<Ready>, chain: &Sender<Chained>) {
     }
 }
 
-/// One that still waits after that.
-fn look_at(
-    (mut ready, failures, then): (Ready, u32, Instant),
-    chain: &Sender<Chained>,
-) -> Option<(Ready, u32, Instant)> {
+/// Looks at a result that waits; it, where it still waits after that.
+fn look_at(Parked { mut ready, failures, then }: Parked, chain: &Sender<Chained>) -> Option<Parked> {
     let in_flight = ready.in_flight.clone();
     let is_wanted = in_flight.job.is_wanted();
     if is_wanted && Instant::now() < then {
-        return Some((ready, failures, then));
+        return Some(Parked { ready, failures, then });
     }
     let _in_stage = in_flight.in_stage(Stage::Write);
     match try_to_put(&mut ready) {
         Err(error) if is_wanted && ready.is_there() && !error.is_lasting() => {
             tracing::debug!(failures, "the result is still not written: {error}");
             in_flight.is_in_trouble(Some(error.to_string()));
-            Some((ready, failures + 1, Instant::now() + passing::pause(failures + 1)))
+            Some(Parked::new(ready, failures + 1))
         }
         ended => {
             in_flight.is_in_trouble(None);

@@ -2,6 +2,7 @@
 
 use crate::formats::gmsh;
 use crate::report::ExportReport;
+use crate::result_files;
 use planish_core::atlas::Chart;
 use planish_core::certified::NARROW;
 use planish_core::evaluate::Plane;
@@ -237,10 +238,12 @@ fn algorithms(charts: &[CertifiedChart], linear: &LinearAtlas, distortions: &[Su
 }
 
 fn files(atlas: &CertifiedAtlas, linear: &LinearAtlas, script: &gmsh::Script) -> Vec<(String, Vec<u8>)> {
-    let mut files =
-        vec![(gmsh::ATLAS.to_owned(), gmsh::atlas(atlas, linear)), (gmsh::REMESH.to_owned(), gmsh::remesh(script))];
+    let mut files = vec![
+        (result_files::ATLAS_MSH.to_owned(), gmsh::atlas(atlas, linear)),
+        (result_files::REMESH.to_owned(), gmsh::remesh(script)),
+    ];
     let enlarged = Some(script.algorithms.enlarged).filter(|factor| *factor != 1.0);
-    files.extend(enlarged.map(|by| (gmsh::ENLARGED.to_owned(), gmsh::enlarged(linear, atlas.seams(), by))));
+    files.extend(enlarged.map(|by| (result_files::ENLARGED_MSH.to_owned(), gmsh::enlarged(linear, atlas.seams(), by))));
     files
 }
 

@@ -1,6 +1,6 @@
 //! How every reader ends: points, triangles and notes become what a file holds, or its refusal.
 
-use super::place::Place;
+use super::location::Location;
 use super::{Content, Notes, ReadError};
 use planish_core::mesh::{SoupError, TriangleSoup};
 use planish_core::vec3::Vec3;
@@ -8,18 +8,18 @@ use planish_core::vec3::Vec3;
 /// Where points are that can be no corners ([`TriangleSoup::may_hold`]), by their numbers, which ascend. Whether a triangle
 /// has them for corners shows at the end only.
 #[derive(Debug, Default)]
-pub(super) struct BadPoints(pub Vec<(usize, Place)>);
+pub(super) struct BadPoints(pub Vec<(usize, Location)>);
 
 impl BadPoints {
     /// Keeps the place of a point, if it can be no corner.
     #[inline]
-    pub fn check(&mut self, number: usize, point: &Vec3, place: impl FnOnce() -> Place) {
+    pub fn check(&mut self, number: usize, point: &Vec3, location: impl FnOnce() -> Location) {
         if !TriangleSoup::may_hold(point) {
-            self.0.push((number, place()));
+            self.0.push((number, location()));
         }
     }
 
-    fn place(&self, number: usize) -> Option<Place> {
+    fn location(&self, number: usize) -> Option<Location> {
         self.0.binary_search_by_key(&number, |bad| bad.0).ok().map(|i| self.0[i].1)
     }
 }
@@ -43,11 +43,11 @@ pub(super) fn content(
     match TriangleSoup::new(points, triangles) {
         Ok(soup) => Ok(Content { soup, notes }),
         Err(error) => {
-            let place = match error {
-                SoupError::NotFinite { point, .. } => bad.place(point),
+            let location = match error {
+                SoupError::NotFinite { point, .. } => bad.location(point),
                 _ => None,
             };
-            Err(ReadError::Soup { error, place, notes: Box::new(notes) })
+            Err(ReadError::Soup { error, location, notes: Box::new(notes) })
         }
     }
 }

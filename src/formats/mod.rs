@@ -4,6 +4,7 @@ mod content;
 mod finish;
 mod gltf;
 pub mod gmsh;
+mod location;
 mod medit;
 mod msh;
 #[cfg(test)]
@@ -12,20 +13,20 @@ mod mutate;
 mod obj;
 mod off;
 mod patches;
-mod place;
 mod ply;
 mod polygon;
 mod scalar;
 mod sniff;
 mod stl;
+mod value_error;
 mod vtk;
 mod words;
 
 use crate::outcome::{Code, Reason};
 pub use crate::settings::Limits;
 pub use content::{Content, NoSiblings, Notes, SiblingFiles, Source, TooMany};
+use location::Location;
 pub use patches::Patches;
-use place::Place;
 use planish_core::mesh::SoupError;
 use std::path::Path;
 pub use vtk::{vtm, vtp, vtu};
@@ -191,12 +192,12 @@ pub enum ReadError {
         notes: Box<Notes>,
     },
     /// What was read makes no sense.
-    #[error("{}{error}", place.map(|p| format!("{p}: ")).unwrap_or_default())]
+    #[error("{}{error}", location.map(|p| format!("{p}: ")).unwrap_or_default())]
     Soup {
         /// Why.
         error: SoupError,
         /// The line or byte, where there is one.
-        place: Option<Place>,
+        location: Option<Location>,
         /// What else there is to tell.
         notes: Box<Notes>,
     },
@@ -205,24 +206,24 @@ pub enum ReadError {
 impl ReadError {
     /// The refusal that this error means.
     pub fn reason(&self) -> Reason {
-        let (code, place) = match self {
+        let (code, location) = match self {
             Self::Empty => (Code::EmptyFile, Some("byte 0".to_owned())),
             Self::Foreign { .. } => (Code::UnsupportedFormat, Some("byte 0".to_owned())),
-            Self::Stl(e) => (e.code(), e.place()),
-            Self::Obj(e) => (e.code(), e.place()),
-            Self::Gltf(e) => (e.code(), e.place()),
-            Self::Vtk(e) => (e.code(), e.place()),
-            Self::Ply(e) => (e.code(), e.place()),
-            Self::Msh(e) => (e.code(), e.place()),
-            Self::Off(e) => (e.code(), e.place()),
-            Self::Medit(e) => (e.code(), e.place()),
+            Self::Stl(e) => (e.code(), e.location()),
+            Self::Obj(e) => (e.code(), e.location()),
+            Self::Gltf(e) => (e.code(), e.location()),
+            Self::Vtk(e) => (e.code(), e.location()),
+            Self::Ply(e) => (e.code(), e.location()),
+            Self::Msh(e) => (e.code(), e.location()),
+            Self::Off(e) => (e.code(), e.location()),
+            Self::Medit(e) => (e.code(), e.location()),
             Self::NoSurface { .. } => (Code::NoTriangles, None),
-            Self::Soup { error, place, .. } => {
+            Self::Soup { error, location, .. } => {
                 let (code, element) = soup_reason(error);
-                (code, place.map(|p| p.to_string()).or(element))
+                (code, location.map(|p| p.to_string()).or(element))
             }
         };
-        Reason::at(code, self, place)
+        Reason::at(code, self, location)
     }
 
     /// What the file holds beside a surface, where it could be read to its end.
@@ -291,8 +292,9 @@ pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Refusal>
         // Those are in no format.
         if !matches!(error, ReadError::Empty | ReadError::Foreign { .. }) {
             let format = sniff::sniff(source.bytes).unwrap_or(format);
-            let begins_with_place = reason.place.as_ref().is_some_and(|place| reason.message.starts_with(place));
-            let separator = if begins_with_place { "," } else { ":" };
+            let begins_with_location =
+                reason.location.as_ref().is_some_and(|location| reason.message.starts_with(location));
+            let separator = if begins_with_location { "," } else { ":" };
             reason.message = format!("{format}{separator} {}", reason.message);
         }
         Refusal { reason, notes: error.notes().cloned().map(Box::new) }
@@ -499,7 +501,7 @@ mod tests {
             for (format, bytes) in files {
                 let reason = read_alone(format, &bytes).expect_err(word).reason();
                 assert!(reason.message.contains(told) && reason.message.contains(word), "{format}: {}", reason.message);
-                assert!(reason.code == Code::Malformed && reason.place.is_some(), "{format}: {reason:?}");
+                assert!(reason.code == Code::Malformed && reason.location.is_some(), "{format}: {reason:?}");
             }
         }
     }
@@ -522,7 +524,7 @@ mod tests {
             for format in [Format::Stl, Format::Obj, Format::Ply, Format::Gltf, Format::Vtu, Format::Msh] {
                 let reason = read_alone(format, bytes).expect_err(what).reason();
                 assert!(reason.message.contains(what), "{}", reason.message);
-                assert_eq!((reason.code, reason.place.as_deref()), (Code::UnsupportedFormat, Some("byte 0")));
+                assert_eq!((reason.code, reason.location.as_deref()), (Code::UnsupportedFormat, Some("byte 0")));
             }
         }
     }
@@ -530,6 +532,6 @@ mod tests {
     #[test]
     fn an_empty_file_is_refused_with_its_place() {
         let reason = read_alone(Format::Stl, b"").expect_err("empty").reason();
-        assert_eq!((reason.code, reason.place.as_deref()), (Code::EmptyFile, Some("byte 0")));
+        assert_eq!((reason.code, reason.location.as_deref()), (Code::EmptyFile, Some("byte 0")));
     }
 }

@@ -1,6 +1,6 @@
 //! The words of a text file, without a copy of any.
 
-use super::place::escape;
+use super::location::escape;
 
 /// What is left of a text, and the number of its line. Lines end with a line feed, a carriage return, or both.
 #[derive(Clone, Copy)]

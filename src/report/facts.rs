@@ -81,7 +81,7 @@ impl Facts {
         let refused_components = self.surface.as_ref().map_or(vec![], |s| s.refused.clone());
         let CertifiedFacts { charts, charts_by_splitting, seams, hand_off, outputs } = certified;
         let report = self.report(settings);
-        let decomposition = report.decomposition.clone().map(|d| Decomposition { charts_by_splitting, ..d });
+        let decomposition = report.decomposition.map(|d| Decomposition { charts_by_splitting, ..d });
         let status = Status::Certified;
         Report { status, refused_components, decomposition, charts, seams, hand_off, outputs, ..report }
     }

@@ -163,9 +163,9 @@ fn tell_trouble(job: &Job, end: &End) {
         End::Waiting(reason) | End::Again(reason) => eprint_line(&format!("{input}: {}", reason.message)),
         End::Lost => eprint_line(&format!("{input}: planish broke down; that is a fault of planish: please report it")),
         End::Done(Done { report: Report { reason: Some(reason), status, .. }, .. }) => {
-            let untold = reason.place.as_ref().filter(|place| !reason.message.contains(place.as_str()));
-            let place = untold.map_or(String::new(), |place| format!(" ({place})"));
-            eprint_line(&format!("{input}: {status}: {}{place} [{}]", reason.message, reason.code.name()));
+            let untold = reason.location.as_ref().filter(|location| !reason.message.contains(location.as_str()));
+            let location = untold.map_or(String::new(), |location| format!(" ({location})"));
+            eprint_line(&format!("{input}: {status}: {}{location} [{}]", reason.message, reason.code.name()));
         }
         End::Done(_) | End::Later(..) | End::Held(..) | End::Outdated(_) | End::Unwanted | End::Same => {}
     }

@@ -69,7 +69,7 @@ fn keep(format: Format, bytes: &[u8], problem: &str) -> ! {
 
 /// Whether a refusal is about something behind the head of the file.
 fn is_past_the_head(bytes: &[u8], reason: &Reason) -> bool {
-    let Some(place) = &reason.place else {
+    let Some(place) = &reason.location else {
         return matches!(reason.code, Code::NoTriangles | Code::TooLarge | Code::NotFinite);
     };
     if reason.code == Code::EmptyFile {

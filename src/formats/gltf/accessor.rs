@@ -61,7 +61,7 @@ impl Accessors<'_> {
     /// The vectors of an accessor.
     pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f64; 3]>, GltfError> {
         let (accessor, count) = self.get(index)?;
-        let fail = |problem: String| broken(place(index), problem);
+        let fail = |problem: String| broken(location(index), problem);
         let kind = component(&accessor.component_type).ok_or_else(|| fail("an unknown component type".to_owned()))?;
         if accessor.type_ != Checked::Valid(Type::Vec3) {
             return Err(fail("positions must be VEC3".to_owned()));
@@ -86,7 +86,7 @@ impl Accessors<'_> {
     /// The indices of an accessor.
     pub fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, GltfError> {
         let (accessor, count) = self.get(index)?;
-        let fail = |problem: String| broken(place(index), problem);
+        let fail = |problem: String| broken(location(index), problem);
         let kind = component(&accessor.component_type).filter(|kind| is_index(*kind));
         let kind = kind.ok_or_else(|| fail("indices must be U8, U16 or U32".to_owned()))?;
         if accessor.type_ != Checked::Valid(Type::Scalar) || accessor.sparse.is_some() {
@@ -100,12 +100,12 @@ impl Accessors<'_> {
 
     /// An accessor and its number of elements.
     fn get(&self, index: Index<Accessor>) -> Result<(&Accessor, usize), GltfError> {
-        let fail = |problem: &str| broken(place(index), problem);
+        let fail = |problem: &str| broken(location(index), problem);
         let accessor = self.root.accessors.get(index.value()).ok_or_else(|| fail("there is none"))?;
         let count = accessor.count.0;
         if count > self.most {
             let problem = format!("{count} elements, more than {}", self.most);
-            return Err(GltfError::TooMuch { place: place(index), problem });
+            return Err(GltfError::TooMuch { location: location(index), problem });
         }
         Ok((accessor, usize::try_from(count).map_err(|_| fail("too many elements"))?))
     }
@@ -113,7 +113,7 @@ impl Accessors<'_> {
     /// Without data of its own, an accessor's may be compressed: that has a name.
     fn without_data(&self, index: Index<Accessor>) -> GltfError {
         let used = self.root.extensions_used.iter().find(|name| name.contains("compression"));
-        used.map_or_else(|| broken(place(index), "no data"), |name| GltfError::Extension(super::escape(name)))
+        used.map_or_else(|| broken(location(index), "no data"), |name| GltfError::Extension(super::escape(name)))
     }
 
     /// The places whose values a sparse accessor gives.
@@ -127,9 +127,9 @@ impl Accessors<'_> {
         let kind = kind.ok_or_else(|| Sparse::Broken("an unknown type of sparse indices".to_owned()))?;
         let view = self.buffers.view(sparse.indices.buffer_view).map_err(Sparse::View)?;
         let layout = Layout::new(view, sparse.indices.byte_offset.0, given, kind.size()).map_err(Sparse::Broken)?;
-        let places: Vec<usize> = indices(&layout, kind).into_iter().map(|place| place as usize).collect();
+        let places: Vec<usize> = indices(&layout, kind).into_iter().map(|index| index as usize).collect();
         match places.iter().find(|p| **p >= count) {
-            Some(place) => Err(Sparse::Broken(format!("sparse value {place} of {count}"))),
+            Some(index) => Err(Sparse::Broken(format!("sparse value {index} of {count}"))),
             None => Ok(places),
         }
     }
@@ -144,13 +144,13 @@ enum Sparse {
 impl Sparse {
     fn at(self, index: Index<Accessor>) -> GltfError {
         match self {
-            Self::Broken(problem) => broken(place(index), problem),
+            Self::Broken(problem) => broken(location(index), problem),
             Self::View(error) => error,
         }
     }
 }
 
-fn place(index: Index<Accessor>) -> String {
+fn location(index: Index<Accessor>) -> String {
     format!("accessors[{}]", index.value())
 }
 

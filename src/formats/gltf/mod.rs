@@ -65,18 +65,18 @@ pub enum GltfError {
         problem: String,
     },
     /// Something is described that is not there, or makes no sense.
-    #[error("{place}: {problem}; the document is damaged: export it again")]
+    #[error("{location}: {problem}; the document is damaged: export it again")]
     Broken {
         /// The place in the document, as `accessors[3]`.
-        place: String,
+        location: String,
         /// What is wrong.
         problem: String,
     },
     /// There is too much of something.
-    #[error("{place}: {problem}; export the surface in parts")]
+    #[error("{location}: {problem}; export the surface in parts")]
     TooMuch {
         /// The place in the document.
-        place: String,
+        location: String,
         /// Of what there is too much.
         problem: String,
     },
@@ -93,12 +93,12 @@ impl GltfError {
         }
     }
 
-    pub(super) fn place(&self) -> Option<String> {
+    pub(super) fn location(&self) -> Option<String> {
         match self {
             Self::Container { byte, .. } => Some(format!("byte {byte}")),
             Self::Json { line, .. } => Some(format!("line {line}")),
             Self::Uri { buffer, .. } | Self::Missing { buffer, .. } => Some(format!("buffers[{buffer}]")),
-            Self::Broken { place, .. } | Self::TooMuch { place, .. } => Some(place.clone()),
+            Self::Broken { location, .. } | Self::TooMuch { location, .. } => Some(location.clone()),
             Self::Version(_) => Some("asset.version".to_owned()),
             Self::Extension(_) => Some("extensionsRequired".to_owned()),
         }
@@ -106,8 +106,8 @@ impl GltfError {
 }
 
 /// A part of the document that is broken.
-fn broken(place: String, problem: impl ToString) -> GltfError {
-    GltfError::Broken { place, problem: problem.to_string() }
+fn broken(location: String, problem: impl ToString) -> GltfError {
+    GltfError::Broken { location, problem: problem.to_string() }
 }
 
 /// Extensions that change nothing in the shape of the surface, or are read here.

@@ -73,7 +73,7 @@ fn instances(root: &Root, depth: usize) -> Result<Vec<(usize, Transform)>, GltfE
         }
         if level >= depth {
             let problem = format!("nodes are nested more than {depth} deep");
-            return Err(GltfError::TooMuch { place: format!("nodes[{i}]"), problem });
+            return Err(GltfError::TooMuch { location: format!("nodes[{i}]"), problem });
         }
         let here = above.then(&Transform::of(node));
         found.extend(node.mesh.map(|mesh| (mesh.value(), here)));
@@ -105,8 +105,8 @@ impl Walk<'_> {
         Ok(())
     }
 
-    fn primitive(&mut self, primitive: &Primitive, transform: &Transform, place: &str) -> Result<(), GltfError> {
-        let fail = |problem: &str| broken(place.to_owned(), problem);
+    fn primitive(&mut self, primitive: &Primitive, transform: &Transform, location: &str) -> Result<(), GltfError> {
+        let fail = |problem: &str| broken(location.to_owned(), problem);
         let Checked::Valid(mode) = primitive.mode else { return Err(fail("an unknown mode")) };
         if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
             let kind = if mode == Mode::Points { "points primitive" } else { "lines primitive" };
@@ -131,7 +131,7 @@ impl Walk<'_> {
         let total = (base + points.len()).max(self.scene.triangles.len() + corners.len());
         if total as u64 > self.most {
             let problem = format!("{total} points or triangles with all instances, more than {}", self.most);
-            return Err(GltfError::TooMuch { place: place.to_owned(), problem });
+            return Err(GltfError::TooMuch { location: location.to_owned(), problem });
         }
         points.iter_mut().for_each(|p| *p = transform.of_point(*p));
         if base == 0 {

@@ -227,7 +227,7 @@ fn nothing_is_asked_for_but_plain_names() {
         let refused = super::super::read(Format::Gltf, &source).expect_err(uri);
         let ReadError::Gltf(GltfError::Uri { buffer: 0, .. }) = &refused else { panic!("{uri}: {refused}") };
         let reason = refused.reason();
-        assert_eq!((reason.code, reason.place.as_deref()), (Code::ForeignFile, Some("buffers[0]")));
+        assert_eq!((reason.code, reason.location.as_deref()), (Code::ForeignFile, Some("buffers[0]")));
         assert!(asked.0.borrow().is_empty(), "{uri}");
     }
     let asked = Recorder::default();
@@ -274,9 +274,9 @@ fn what_is_broken_is_named() {
         ("/extensionsRequired", json!(["EXT_meshopt_compression"]), "extensionsRequired"),
         ("/asset/version", json!("1.0"), "asset.version"),
     ];
-    for (path, value, place) in cases {
+    for (path, value, location) in cases {
         let found = error(&changed(&[(path, value)]));
-        assert_eq!(found.place().as_deref(), Some(place), "{path}: {found}");
+        assert_eq!(found.location().as_deref(), Some(location), "{path}: {found}");
     }
     let mut fallback = changed(&[("/extensionsUsed", json!(["KHR_draco_mesh_compression"]))]);
     fallback["accessors"][0].as_object_mut().expect("an object").remove("bufferView");
@@ -347,7 +347,7 @@ fn nodes_are_nested_so_deep_only() {
     let most = Limits::default().depth;
     assert_eq!(soup(&chain(most)), soup(&square()));
     let found = error(&chain(most + 1));
-    assert!(matches!(&found, GltfError::TooMuch { place, .. } if *place == format!("nodes[{most}]")), "{found}");
+    assert!(matches!(&found, GltfError::TooMuch { location, .. } if *location == format!("nodes[{most}]")), "{found}");
 }
 
 /// Two hundred nodes show a mesh each, the mesh of all points: far more than the file has.

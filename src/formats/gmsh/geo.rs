@@ -1,6 +1,6 @@
 //! `remesh.geo`: a script that merges the atlas, sets sizes, and tells its reader what to change.
 
-use super::{ATLAS, ENLARGED};
+use crate::result_files::{ATLAS_MSH as ATLAS, ENLARGED_MSH as ENLARGED};
 use planish_core::measure::spikes::Spike;
 
 /// From about this many triangles on, the script asks for the faster algorithm.

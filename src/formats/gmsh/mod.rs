@@ -7,7 +7,6 @@ mod geo;
 mod mesh;
 mod read;
 
-pub use crate::result_files::{ATLAS_MSH as ATLAS, ENLARGED_MSH as ENLARGED, REMESH};
 pub use geo::{Algorithms, Narrow, Script, remesh};
 pub use read::{AtlasError, read as read_atlas};
 

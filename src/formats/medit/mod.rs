@@ -8,7 +8,7 @@
 mod sections;
 
 use super::finish::{self, BadPoints};
-use super::place::{Place, escape};
+use super::location::{Location, escape};
 use super::words::{Uncommented, Words, float, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
@@ -110,7 +110,7 @@ impl MeditError {
         }
     }
 
-    pub(super) fn place(&self) -> Option<String> {
+    pub(super) fn location(&self) -> Option<String> {
         let line = match self {
             Self::NotMedit { .. } => 1,
             Self::TooMany(_) | Self::NoSection(..) => return None,
@@ -121,7 +121,7 @@ impl MeditError {
             | Self::NoKeyword { line, .. }
             | Self::SecondSection { line } => *line,
         };
-        Some(Place::Line(line).to_string())
+        Some(Location::Line(line).to_string())
     }
 }
 
@@ -310,7 +310,7 @@ impl<'a> File<'a> {
             for c in point.iter_mut().take(dimension as usize) {
                 *c = values.float()?;
             }
-            self.bad.check(self.points.len(), &point, || Place::Line(values.line()));
+            self.bad.check(self.points.len(), &point, || Location::Line(values.line()));
             self.points.push(point);
             values.reference()?;
         }

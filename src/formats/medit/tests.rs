@@ -105,9 +105,9 @@ fn broken_files_are_refused_with_code_and_place() {
         (square(&format!("{TWO}Vertices\n0\n")), Code::Malformed, Some("line 17"), "another section Vertices"),
         (format!("{SQUARE}Triangles\n2\n1 2 3 7\n1 3      4"), Code::CountMismatch, Some("line 15"), "ends in section"),
     ];
-    for (text, code, place, word) in rows {
+    for (text, code, location, word) in rows {
         let reason = content(&text).expect_err(&text).reason();
-        assert_eq!((reason.code, reason.place.as_deref()), (code, place), "{reason:?}\n{text}");
+        assert_eq!((reason.code, reason.location.as_deref()), (code, location), "{reason:?}\n{text}");
         assert!(reason.message.contains(word), "{reason:?}");
     }
     let cloud = content(&square(""));

@@ -12,13 +12,13 @@ mod sparse;
 mod surface;
 mod values;
 
-use super::place::{Place, escape};
+use super::location::{Location, escape};
 use super::words::{Words, float};
 use super::{Content, Limits, Notes, Patches, ReadError, Source, TooMany};
 use crate::outcome::Code;
 use nodes::Nodes;
 use surface::Surface;
-use values::{Binary, Fault, Text, Values};
+use values::{Binary, SectionError, Text, Values};
 
 /// Why bytes are no MSH file.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -49,7 +49,7 @@ pub enum MshError {
     },
     /// There are fewer bytes than the declared records take.
     #[error(
-        "{place}: {count} {what} are declared ({needed} bytes at least), but only {left} bytes follow; the file was cut off or the number is wrong: copy or save it again"
+        "{location}: {count} {what} are declared ({needed} bytes at least), but only {left} bytes follow; the file was cut off or the number is wrong: copy or save it again"
     )]
     Count {
         /// Nodes or elements.
@@ -61,10 +61,10 @@ pub enum MshError {
         /// Bytes there are.
         left: u64,
         /// Where they are declared.
-        place: Place,
+        location: Location,
     },
     /// The blocks of a section hold more or fewer records than it declares.
-    #[error("{place}: {count} {what} are declared, but the blocks hold {found}; save the file again with Gmsh")]
+    #[error("{location}: {count} {what} are declared, but the blocks hold {found}; save the file again with Gmsh")]
     Sum {
         /// Nodes or elements.
         what: &'static str,
@@ -73,44 +73,44 @@ pub enum MshError {
         /// How many there are, so far at least.
         found: u64,
         /// Where that shows.
-        place: Place,
+        location: Location,
     },
     /// There are more than may be.
     #[error(transparent)]
     TooMany(#[from] TooMany),
     /// The file ends in the middle of a section.
     #[error(
-        "{place}: the file ends in section ${section}; it was cut off or a number in it is wrong: copy or save it again"
+        "{location}: the file ends in section ${section}; it was cut off or a number in it is wrong: copy or save it again"
     )]
     Truncated {
         /// The section.
         section: String,
         /// Where the file ends.
-        place: Place,
+        location: Location,
     },
     /// A section ends in the middle.
     #[error(
-        "{place}: section ${section} ends before all that it declares is there; correct its numbers or save the file again with Gmsh"
+        "{location}: section ${section} ends before all that it declares is there; correct its numbers or save the file again with Gmsh"
     )]
     Short {
         /// The section.
         section: String,
         /// Where it ends.
-        place: Place,
+        location: Location,
     },
     /// A value is not what it should be.
-    #[error("{place}: {problem}, in section ${section}; correct it or save the file again with Gmsh")]
+    #[error("{location}: {problem}, in section ${section}; correct it or save the file again with Gmsh")]
     Value {
         /// The section.
         section: String,
         /// What is wrong.
         problem: String,
         /// Where.
-        place: Place,
+        location: Location,
     },
     /// A section goes on behind its declared records.
     #[error(
-        "{place}: section ${section} goes on with \"{found}\" behind all that it declares; correct its numbers or save the file again with Gmsh"
+        "{location}: section ${section} goes on with \"{found}\" behind all that it declares; correct its numbers or save the file again with Gmsh"
     )]
     NoEnd {
         /// The section.
@@ -118,7 +118,7 @@ pub enum MshError {
         /// What there is in the place of its end.
         found: String,
         /// Where.
-        place: Place,
+        location: Location,
     },
     /// A section is missing, or comes too late.
     #[error("there is no section ${section}{}; save the file again with Gmsh", if *late { " before $Elements" } else { "" })]
@@ -129,12 +129,12 @@ pub enum MshError {
         late: bool,
     },
     /// There are two sections where there may be one.
-    #[error("{place}: there is another section ${section}; split the file, one mesh in each")]
+    #[error("{location}: there is another section ${section}; split the file, one mesh in each")]
     SecondSection {
         /// The section.
         section: String,
         /// Where it begins.
-        place: Place,
+        location: Location,
     },
     /// Two nodes have the same tag.
     #[error("there are two nodes {node}; renumber the mesh, or save it again with Gmsh")]
@@ -143,16 +143,16 @@ pub enum MshError {
         node: u64,
     },
     /// An element of a type that is not known.
-    #[error("{place}: {number} is no type of elements that planish knows; save the mesh without them")]
+    #[error("{location}: {number} is no type of elements that planish knows; save the mesh without them")]
     NoType {
         /// The number of the type.
         number: i64,
         /// Where.
-        place: Place,
+        location: Location,
     },
     /// An element names a node that does not exist.
     #[error(
-        "{place}: element {element} names node {node}, and there is none of this tag; save the file again with Gmsh"
+        "{location}: element {element} names node {node}, and there is none of this tag; save the file again with Gmsh"
     )]
     NoNode {
         /// The tag of the element.
@@ -160,7 +160,7 @@ pub enum MshError {
         /// The tag of the node.
         node: u64,
         /// Where the nodes of the element are.
-        place: Place,
+        location: Location,
     },
 }
 
@@ -175,21 +175,21 @@ impl MshError {
         }
     }
 
-    pub(super) fn place(&self) -> Option<String> {
+    pub(super) fn location(&self) -> Option<String> {
         match self {
-            Self::NotMsh { .. } => Some(Place::Line(1).to_string()),
-            Self::Version { line, .. } | Self::Format { line, .. } => Some(Place::Line(*line).to_string()),
+            Self::NotMsh { .. } => Some(Location::Line(1).to_string()),
+            Self::Version { line, .. } | Self::Format { line, .. } => Some(Location::Line(*line).to_string()),
             Self::TooMany(_) | Self::NoSection { .. } => None,
             Self::SameNode { node } => Some(format!("node {node}")),
-            Self::Count { place, .. }
-            | Self::Sum { place, .. }
-            | Self::Truncated { place, .. }
-            | Self::Short { place, .. }
-            | Self::Value { place, .. }
-            | Self::NoEnd { place, .. }
-            | Self::SecondSection { place, .. }
-            | Self::NoType { place, .. }
-            | Self::NoNode { place, .. } => Some(place.to_string()),
+            Self::Count { location, .. }
+            | Self::Sum { location, .. }
+            | Self::Truncated { location, .. }
+            | Self::Short { location, .. }
+            | Self::Value { location, .. }
+            | Self::NoEnd { location, .. }
+            | Self::SecondSection { location, .. }
+            | Self::NoType { location, .. }
+            | Self::NoNode { location, .. } => Some(location.to_string()),
         }
     }
 }
@@ -221,7 +221,7 @@ fn surface<'n>(source: &Source<'n>, keep: bool) -> Result<(Surface<'n>, Notes), 
     let mut begins = words.next().unwrap_or_default();
     while begins == b"$Comments" {
         let mut text = Text(words);
-        let fail = || MshError::Truncated { section: "Comments".to_owned(), place: Place::Line(words.line()) };
+        let fail = || MshError::Truncated { section: "Comments".to_owned(), location: Location::Line(words.line()) };
         text.until_end(b"Comments").ok_or_else(fail)?;
         words = text.0;
         begins = words.next().unwrap_or_default();
@@ -298,10 +298,10 @@ fn body<'a, 'n, V: Values<'a>>(
         if let Some(name) = word.strip_prefix(b"$") {
             let section = escape(name);
             found.section(name, &mut values, version, limits, &mut notes).map_err(|fault| match fault {
-                Fault::End => MshError::Truncated { section, place: values.place() },
-                Fault::Short => MshError::Short { section, place: values.place() },
-                Fault::Value(problem) => MshError::Value { section, problem, place: values.place() },
-                Fault::Told(error) => *error,
+                SectionError::End => MshError::Truncated { section, location: values.location() },
+                SectionError::Short => MshError::Short { section, location: values.location() },
+                SectionError::Value(problem) => MshError::Value { section, problem, location: values.location() },
+                SectionError::Told(error) => *error,
             })?;
         }
     }
@@ -319,7 +319,7 @@ impl<'n> Found<'n> {
         version: Version,
         limits: &'n Limits,
         notes: &mut Notes,
-    ) -> Result<(), Fault> {
+    ) -> Result<(), SectionError> {
         match (name, version) {
             (b"Nodes" | b"ParametricNodes", _) if self.nodes.is_some() || self.surface.is_some() => {
                 return Err(second(name, values));
@@ -339,11 +339,11 @@ impl<'n> Found<'n> {
                 }
             }
             (b"PhysicalNames", _) => {
-                names(values.until_end(name).ok_or(Fault::End)?, notes);
+                names(values.until_end(name).ok_or(SectionError::End)?, notes);
                 return Ok(());
             }
             _ => {
-                values.until_end(name).ok_or(Fault::End)?;
+                values.until_end(name).ok_or(SectionError::End)?;
                 return Ok(());
             }
         }
@@ -351,8 +351,8 @@ impl<'n> Found<'n> {
     }
 }
 
-fn second<'a>(name: &[u8], values: &impl Values<'a>) -> Fault {
-    MshError::SecondSection { section: escape(name), place: values.place() }.into()
+fn second<'a>(name: &[u8], values: &impl Values<'a>) -> SectionError {
+    MshError::SecondSection { section: escape(name), location: values.location() }.into()
 }
 
 /// Passes over the end of a section.
@@ -360,8 +360,8 @@ fn end_section<'a>(values: &mut impl Values<'a>, name: &[u8]) -> Result<(), MshE
     let section = escape(name);
     match values.word() {
         Some(word) if word.strip_prefix(b"$End") == Some(name) => Ok(()),
-        Some(word) => Err(MshError::NoEnd { section, found: escape(word), place: values.place() }),
-        None => Err(MshError::Truncated { section, place: values.place() }),
+        Some(word) => Err(MshError::NoEnd { section, found: escape(word), location: values.location() }),
+        None => Err(MshError::Truncated { section, location: values.location() }),
     }
 }
 

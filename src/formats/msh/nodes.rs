@@ -78,11 +78,11 @@ impl Numbering {
     fn table(tags: &[u64], first: u64, places: usize) -> Result<Self, MshError> {
         let mut table = vec![NONE; places];
         for (node, tag) in tags.iter().enumerate() {
-            let place = &mut table[(tag - first) as usize];
-            if *place != NONE {
+            let slot = &mut table[(tag - first) as usize];
+            if *slot != NONE {
                 return Err(MshError::SameNode { node: *tag });
             }
-            *place = node as u32;
+            *slot = node as u32;
         }
         Ok(Self::Table(first, table))
     }

@@ -5,16 +5,16 @@ use super::nodes::Nodes;
 use super::plain::Layout;
 use super::shapes::{Kind, Shape};
 use super::surface::Surface;
-use super::values::{Fault, Values, number};
+use super::values::{SectionError, Values, number};
 use crate::formats::finish::BadPoints;
 use crate::formats::{Limits, TooMany};
 use planish_core::vec3::Vec3;
 
 /// Checks that so many records can be there, of so many bytes each at least.
 fn fits<'a, V: Values<'a>>(values: &V, what: &'static str, count: u64, bytes: u64, most: u64) -> Result<(), MshError> {
-    let (needed, left, place) = (count.saturating_mul(bytes), values.left(), values.place());
+    let (needed, left, location) = (count.saturating_mul(bytes), values.left(), values.location());
     if needed > left {
-        return Err(MshError::Count { what, count, needed, left, place });
+        return Err(MshError::Count { what, count, needed, left, location });
     }
     Ok(TooMany::check(what, count, most)?)
 }
@@ -34,30 +34,30 @@ impl Growing {
     }
 
     /// Reads the coordinates of a node.
-    fn point<'a, V: Values<'a>>(&mut self, values: &mut V) -> Result<(), Fault> {
-        let begin = values.place();
+    fn point<'a, V: Values<'a>>(&mut self, values: &mut V) -> Result<(), SectionError> {
+        let begin = values.location();
         let point = [values.double()?, values.double()?, values.double()?];
-        self.bad.check(self.points.len(), &point, || values.place_since(begin));
+        self.bad.check(self.points.len(), &point, || values.location_since(begin));
         self.points.push(point);
         Ok(())
     }
 
-    fn finish(self) -> Result<Nodes, Fault> {
+    fn finish(self) -> Result<Nodes, SectionError> {
         Ok(Nodes::new(self.points, self.tags, self.bad)?)
     }
 }
 
 /// How many numbers follow the coordinates of a node that lies on something of this dimension, where its parameters
 /// are told.
-fn parameters(dimension: i64) -> Result<u64, Fault> {
+fn parameters(dimension: i64) -> Result<u64, SectionError> {
     u64::try_from(dimension)
         .ok()
         .filter(|d| *d <= 3)
-        .ok_or_else(|| Fault::Value(format!("{dimension} is no dimension (0 to 3)")))
+        .ok_or_else(|| SectionError::Value(format!("{dimension} is no dimension (0 to 3)")))
 }
 
 /// `$Nodes` of MSH 2, or `$ParametricNodes`.
-pub fn nodes_2<'a, V: Values<'a>>(values: &mut V, parametric: bool, limits: &Limits) -> Result<Nodes, Fault> {
+pub fn nodes_2<'a, V: Values<'a>>(values: &mut V, parametric: bool, limits: &Limits) -> Result<Nodes, SectionError> {
     let count: u64 = number(values.word())?;
     values.end_line();
     fits(values, "nodes", count, V::INT + 3 * V::DOUBLE, limits.elements)?;
@@ -77,7 +77,7 @@ pub fn nodes_2<'a, V: Values<'a>>(values: &mut V, parametric: bool, limits: &Lim
 }
 
 /// `$Nodes` of MSH 4.1.
-pub fn nodes_4_1<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nodes, Fault> {
+pub fn nodes_4_1<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nodes, SectionError> {
     values.end_line();
     let (blocks, count) = (values.size()?, values.size()?);
     values.skip(2, V::SIZE)?;
@@ -102,7 +102,7 @@ pub fn nodes_4_1<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<N
 }
 
 /// `$Nodes` of MSH 4.0: the tag of each node stands before its coordinates, and there are no parameters in volumes.
-pub fn nodes_4_0<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nodes, Fault> {
+pub fn nodes_4_0<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<Nodes, SectionError> {
     values.end_line();
     let (blocks, count) = (values.size()?, values.size()?);
     fits(values, "nodes", count, V::INT + 3 * V::DOUBLE, limits.elements)?;
@@ -133,20 +133,20 @@ fn within<'a, V: Values<'a>>(
     if block <= left {
         return Ok(());
     }
-    Err(MshError::Sum { what, count, found: (count - left).saturating_add(block), place: values.place() })
+    Err(MshError::Sum { what, count, found: (count - left).saturating_add(block), location: values.location() })
 }
 
 /// Checks that all declared records were there.
 fn all<'a, V: Values<'a>>(values: &V, what: &'static str, found: u64, count: u64) -> Result<(), MshError> {
-    if found == count { Ok(()) } else { Err(MshError::Sum { what, count, found, place: values.place() }) }
+    if found == count { Ok(()) } else { Err(MshError::Sum { what, count, found, location: values.location() }) }
 }
 
 fn shape<'a, V: Values<'a>>(values: &V, number: i64) -> Result<Shape, MshError> {
-    Shape::of(number).ok_or_else(|| MshError::NoType { number, place: values.place() })
+    Shape::of(number).ok_or_else(|| MshError::NoType { number, location: values.location() })
 }
 
 /// `$Elements` of MSH 2.
-pub fn elements_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), Fault> {
+pub fn elements_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), SectionError> {
     let count: u64 = number(values.word())?;
     values.end_line();
     fits(values, "elements", count, 2 * V::INT, surface.limits.elements)?;
@@ -154,7 +154,7 @@ pub fn elements_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> R
 }
 
 /// One element after the other: tag, type, number of further tags, these, nodes.
-fn lines_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64) -> Result<(), Fault> {
+fn lines_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64) -> Result<(), SectionError> {
     for _ in 0..count {
         let (element, number, tags) = (values.natural()?, values.int()?, values.natural()?);
         let shape = shape(values, number)?;
@@ -171,7 +171,7 @@ fn lines_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64)
 }
 
 /// The further tags of an element: the second one is that of its entity.
-fn tags_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, tags: u64) -> Result<(), Fault> {
+fn tags_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, tags: u64) -> Result<(), SectionError> {
     if tags < 2 {
         return values.skip(tags, V::INT);
     }
@@ -181,7 +181,7 @@ fn tags_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, tags: u64) -
 }
 
 /// Elements of one type together: type, how many, number of further tags; then of each its tag, these, nodes.
-fn blocks_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64) -> Result<(), Fault> {
+fn blocks_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64) -> Result<(), SectionError> {
     let mut left = count;
     while left > 0 {
         let (number, block, tags) = (values.int()?, values.natural()?, values.natural()?);
@@ -205,7 +205,7 @@ fn blocks_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64
 }
 
 /// `$Elements` of MSH 4.1.
-pub fn elements_4_1<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), Fault> {
+pub fn elements_4_1<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), SectionError> {
     values.end_line();
     let (blocks, count) = (values.size()?, values.size()?);
     values.skip(2, V::SIZE)?;
@@ -213,14 +213,14 @@ pub fn elements_4_1<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) ->
 }
 
 /// `$Elements` of MSH 4.0: without the least and the largest tag.
-pub fn elements_4_0<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), Fault> {
+pub fn elements_4_0<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), SectionError> {
     values.end_line();
     let (blocks, count) = (values.size()?, values.size()?);
     elements_4(values, surface, [blocks, count], (V::INT, V::natural))
 }
 
 /// The bytes of a tag, and what reads one.
-type Tag<V> = (u64, fn(&mut V) -> Result<u64, Fault>);
+type Tag<V> = (u64, fn(&mut V) -> Result<u64, SectionError>);
 
 /// Elements of MSH 4, in blocks.
 fn elements_4<'a, V: Values<'a>>(
@@ -228,7 +228,7 @@ fn elements_4<'a, V: Values<'a>>(
     surface: &mut Surface,
     [blocks, count]: [u64; 2],
     (size, tag): Tag<V>,
-) -> Result<(), Fault> {
+) -> Result<(), SectionError> {
     fits(values, "elements", count, 2 * size, surface.limits.elements)?;
     let mut left = count;
     for _ in 0..blocks {
@@ -255,6 +255,6 @@ fn elements_4<'a, V: Values<'a>>(
 }
 
 /// Passes over records of so many numbers each.
-fn skip_records<'a, V: Values<'a>>(values: &mut V, count: u64, numbers: u64, bytes: u64) -> Result<(), Fault> {
-    values.skip(count.checked_mul(numbers).ok_or(Fault::End)?, bytes)
+fn skip_records<'a, V: Values<'a>>(values: &mut V, count: u64, numbers: u64, bytes: u64) -> Result<(), SectionError> {
+    values.skip(count.checked_mul(numbers).ok_or(SectionError::End)?, bytes)
 }

@@ -3,9 +3,9 @@
 use super::MshError;
 use super::nodes::Nodes;
 use super::shapes::{Kind, Shape};
-use super::values::{Fault, Values};
+use super::values::{SectionError, Values};
 use crate::formats::finish;
-use crate::formats::place::Place;
+use crate::formats::location::Location;
 use crate::formats::{Content, Limits, Notes, Patches, ReadError, TooMany, polygon};
 use std::collections::BTreeMap;
 
@@ -62,23 +62,23 @@ impl<'n> Surface<'n> {
         values: &mut V,
         shape: Shape,
         element: u64,
-        number: impl Fn(&mut V) -> Result<u64, Fault>,
-    ) -> Result<(), Fault> {
-        let begin = values.place();
+        number: impl Fn(&mut V) -> Result<u64, SectionError>,
+    ) -> Result<(), SectionError> {
+        let begin = values.location();
         self.at_hand.clear();
         for _ in 0..shape.nodes {
             self.at_hand.push(number(values)?);
         }
-        Ok(self.add(shape, element, values.place_since(begin))?)
+        Ok(self.add(shape, element, values.location_since(begin))?)
     }
 
-    fn add(&mut self, shape: Shape, element: u64, place: Place) -> Result<(), MshError> {
+    fn add(&mut self, shape: Shape, element: u64, location: Location) -> Result<(), MshError> {
         let mut corners = [0; 4];
         let count = if shape.kind == Kind::Quad { 4 } else { 3 };
         let mut mids = [0; 3];
         for i in 0..self.at_hand.len() {
             let node = self.at_hand[i];
-            let found = self.nodes.find(node).ok_or(MshError::NoNode { element, node, place })?;
+            let found = self.nodes.find(node).ok_or(MshError::NoNode { element, node, location })?;
             if i < count {
                 corners[i] = found;
             } else {

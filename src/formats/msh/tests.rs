@@ -289,7 +289,7 @@ fn coordinates_that_are_none_refuse_the_elements_that_have_them_at_corners_only(
     }
     mesh.nodes[4].1[1] = f64::NAN;
     let reason = content(&mesh.file("2.2", Ascii)).expect_err("a corner").reason();
-    assert_eq!((reason.code, reason.place.as_deref()), (Code::NotFinite, Some("line 10")), "{reason:?}");
+    assert_eq!((reason.code, reason.location.as_deref()), (Code::NotFinite, Some("line 10")), "{reason:?}");
     assert!(reason.message.contains("1 corner is of this sort"), "{reason:?}");
 }
 
@@ -382,7 +382,7 @@ fn comments_may_come_first_and_versions_are_numbers() {
     assert!(matches!(error(b"$Comments\n1 2\n"), MshError::Truncated { .. }));
     let text = String::from_utf8(file(Ascii)).expect("text");
     let late = error(format!("$Comments\n\n$EndComments\n{}", text.replace("2.2", "3.0")).as_bytes());
-    assert_eq!(late.place().as_deref(), Some("line 5"));
+    assert_eq!(late.location().as_deref(), Some("line 5"));
     for version in ["2", "2.10", "2.1999999999999997"] {
         assert!(content(text.replace("2.2", version).as_bytes()).is_ok(), "{version}");
     }
@@ -431,9 +431,9 @@ fn broken_files_are_refused_with_code_and_place() {
         (four.replace("1 2 1 9", "1 1 1 9"), Code::CountMismatch, Some("line 13"), "blocks hold 2"),
         (four.replace("2 5 0 3", "9 5 1 3"), Code::Malformed, Some("line 8"), "9 is no dimension"),
     ];
-    for (text, code, place, word) in rows {
+    for (text, code, location, word) in rows {
         let reason = content(text.as_bytes()).expect_err(&text).reason();
-        assert_eq!((reason.code, reason.place.as_deref()), (code, place), "{reason:?}\n{text}");
+        assert_eq!((reason.code, reason.location.as_deref()), (code, location), "{reason:?}\n{text}");
         assert!(reason.message.contains(word), "{reason:?}");
     }
     let cloud = Mesh { blocks: Vec::new(), ..square() };
@@ -445,9 +445,9 @@ fn broken_files_are_refused_with_code_and_place() {
 fn broken_binary_files_are_refused_with_their_byte() {
     let file = square().file("4.1", Big);
     let at = |needle: &[u8]| file.windows(needle.len()).position(|w| w == needle).expect("found");
-    let with = |place: usize, new: &[u8]| {
+    let with = |location: usize, new: &[u8]| {
         let mut bytes = file.clone();
-        bytes[place..place + new.len()].copy_from_slice(new);
+        bytes[location..location + new.len()].copy_from_slice(new);
         error(&bytes)
     };
     let nodes = at(b"$Nodes\n") + 7;
@@ -457,13 +457,13 @@ fn broken_binary_files_are_refused_with_their_byte() {
     let mut nan = file.clone();
     nan[point..point + 8].copy_from_slice(&f64::NAN.to_be_bytes());
     let nan = content(&nan).expect_err("a corner").reason();
-    assert_eq!((nan.code, nan.place), (Code::NotFinite, Some(format!("byte {point}"))), "{}", nan.message);
+    assert_eq!((nan.code, nan.location), (Code::NotFinite, Some(format!("byte {point}"))), "{}", nan.message);
     let elements = at(b"$Elements\n") + 10;
     let block = with(elements + 32 + 12, &(1u64 << 63).to_be_bytes());
     assert!(matches!(block, MshError::Sum { what: "elements", count: 2, .. }), "{block:?}");
     let node = with(elements + 32 + 20 + 8, &7u64.to_be_bytes());
-    let place = Place::Byte(elements + 32 + 20 + 8);
-    assert_eq!(node, MshError::NoNode { element: 101, node: 7, place });
+    let location = Location::Byte(elements + 32 + 20 + 8);
+    assert_eq!(node, MshError::NoNode { element: 101, node: 7, location });
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! The values of an MSH file, as text or binary. The names of sections are text in both.
 
 use super::MshError;
-use crate::formats::place::{Place, escape};
+use crate::formats::location::{Location, escape};
 use crate::formats::words::{Words, float, remedy};
 
 /// What is wrong in a section.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Fault {
+pub enum SectionError {
     /// The file ends.
     End,
     /// The section ends.
@@ -17,7 +17,7 @@ pub enum Fault {
     Told(Box<MshError>),
 }
 
-impl From<MshError> for Fault {
+impl From<MshError> for SectionError {
     fn from(error: MshError) -> Self {
         Self::Told(Box::new(error))
     }
@@ -34,11 +34,11 @@ pub trait Values<'a>: Clone {
     const BINARY: bool;
 
     /// Where the next value is, or the last one.
-    fn place(&self) -> Place;
+    fn location(&self) -> Location;
 
     /// The place of a record that was read from here on: its line, or its first byte.
-    fn place_since(&self, begin: Place) -> Place {
-        if Self::BINARY { begin } else { self.place() }
+    fn location_since(&self, begin: Location) -> Location {
+        if Self::BINARY { begin } else { self.location() }
     }
 
     /// Bytes that are left.
@@ -53,14 +53,14 @@ pub trait Values<'a>: Clone {
     /// The bytes up to the end of a section, which is passed over.
     fn until_end(&mut self, section: &[u8]) -> Option<&'a [u8]>;
 
-    fn int(&mut self) -> Result<i64, Fault>;
+    fn int(&mut self) -> Result<i64, SectionError>;
 
-    fn size(&mut self) -> Result<u64, Fault>;
+    fn size(&mut self) -> Result<u64, SectionError>;
 
-    fn double(&mut self) -> Result<f64, Fault>;
+    fn double(&mut self) -> Result<f64, SectionError>;
 
     /// Passes over so many values of so many bytes.
-    fn skip(&mut self, count: u64, bytes: u64) -> Result<(), Fault>;
+    fn skip(&mut self, count: u64, bytes: u64) -> Result<(), SectionError>;
 
     /// The same, if it is binary, for what can be done at once then.
     fn binary(&mut self) -> Option<&mut Binary<'a>> {
@@ -68,15 +68,15 @@ pub trait Values<'a>: Clone {
     }
 
     /// An int that is not negative.
-    fn natural(&mut self) -> Result<u64, Fault> {
+    fn natural(&mut self) -> Result<u64, SectionError> {
         let int = self.int()?;
-        u64::try_from(int).map_err(|_| Fault::Value(format!("{int} is negative")))
+        u64::try_from(int).map_err(|_| SectionError::Value(format!("{int} is negative")))
     }
 }
 
 /// The number that a word of text is.
-pub fn number<T: std::str::FromStr>(word: Option<&[u8]>) -> Result<T, Fault> {
-    let word = word.ok_or(Fault::End)?;
+pub fn number<T: std::str::FromStr>(word: Option<&[u8]>) -> Result<T, SectionError> {
+    let word = word.ok_or(SectionError::End)?;
     let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
     number.ok_or_else(|| no_number(word))
 }
@@ -88,11 +88,11 @@ fn digits(word: &[u8]) -> Option<u64> {
     if (1..=18).contains(&word.len()) { word.iter().try_fold(0, digit) } else { None }
 }
 
-fn no_number(word: &[u8]) -> Fault {
+fn no_number(word: &[u8]) -> SectionError {
     if word.starts_with(b"$") {
-        return Fault::Short;
+        return SectionError::Short;
     }
-    Fault::Value(format!("\"{}\" is no number that can stand here{}", escape(word), remedy(word)))
+    SectionError::Value(format!("\"{}\" is no number that can stand here{}", escape(word), remedy(word)))
 }
 
 /// Where the word that ends a section begins, and where it ends. Some writers of binary files (PyMesh, fTetWild) end no line
@@ -118,8 +118,8 @@ impl<'a> Values<'a> for Text<'a> {
     const DOUBLE: u64 = 2;
     const BINARY: bool = false;
 
-    fn place(&self) -> Place {
-        Place::Line(self.0.line())
+    fn location(&self) -> Location {
+        Location::Line(self.0.line())
     }
 
     fn left(&self) -> u64 {
@@ -141,27 +141,27 @@ impl<'a> Values<'a> for Text<'a> {
     }
 
     #[inline]
-    fn int(&mut self) -> Result<i64, Fault> {
+    fn int(&mut self) -> Result<i64, SectionError> {
         let word = self.word();
         word.and_then(digits).map_or_else(|| number(word), |value| Ok(value as i64))
     }
 
     #[inline]
-    fn size(&mut self) -> Result<u64, Fault> {
+    fn size(&mut self) -> Result<u64, SectionError> {
         let word = self.word();
         word.and_then(digits).map_or_else(|| number(word), Ok)
     }
 
     #[inline]
-    fn double(&mut self) -> Result<f64, Fault> {
-        let word = self.word().ok_or(Fault::End)?;
+    fn double(&mut self) -> Result<f64, SectionError> {
+        let word = self.word().ok_or(SectionError::End)?;
         float(word).ok_or_else(|| no_number(word))
     }
 
-    fn skip(&mut self, count: u64, _bytes: u64) -> Result<(), Fault> {
+    fn skip(&mut self, count: u64, _bytes: u64) -> Result<(), SectionError> {
         (0..count).try_for_each(|_| match self.word() {
-            Some(word) if word.starts_with(b"$") => Err(Fault::Short),
-            word => word.map(|_| ()).ok_or(Fault::End),
+            Some(word) if word.starts_with(b"$") => Err(SectionError::Short),
+            word => word.map(|_| ()).ok_or(SectionError::End),
         })
     }
 }
@@ -181,8 +181,8 @@ impl<'a> Binary<'a> {
     }
 
     #[inline]
-    fn array<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
-        let mut array: [u8; N] = *self.rest().first_chunk().ok_or(Fault::End)?;
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], SectionError> {
+        let mut array: [u8; N] = *self.rest().first_chunk().ok_or(SectionError::End)?;
         self.at += N;
         if self.big {
             array.reverse();
@@ -197,8 +197,8 @@ impl<'a> Values<'a> for Binary<'a> {
     const DOUBLE: u64 = 8;
     const BINARY: bool = true;
 
-    fn place(&self) -> Place {
-        Place::Byte(self.at)
+    fn location(&self) -> Location {
+        Location::Byte(self.at)
     }
 
     fn left(&self) -> u64 {
@@ -226,17 +226,17 @@ impl<'a> Values<'a> for Binary<'a> {
     }
 
     #[inline]
-    fn int(&mut self) -> Result<i64, Fault> {
+    fn int(&mut self) -> Result<i64, SectionError> {
         self.array().map(|b| i64::from(i32::from_le_bytes(b)))
     }
 
     #[inline]
-    fn size(&mut self) -> Result<u64, Fault> {
+    fn size(&mut self) -> Result<u64, SectionError> {
         self.array().map(u64::from_le_bytes)
     }
 
     #[inline]
-    fn double(&mut self) -> Result<f64, Fault> {
+    fn double(&mut self) -> Result<f64, SectionError> {
         self.array().map(f64::from_le_bytes)
     }
 
@@ -244,8 +244,8 @@ impl<'a> Values<'a> for Binary<'a> {
         Some(self)
     }
 
-    fn skip(&mut self, count: u64, bytes: u64) -> Result<(), Fault> {
-        let size = count.checked_mul(bytes).filter(|size| *size <= self.left()).ok_or(Fault::End)?;
+    fn skip(&mut self, count: u64, bytes: u64) -> Result<(), SectionError> {
+        let size = count.checked_mul(bytes).filter(|size| *size <= self.left()).ok_or(SectionError::End)?;
         // It is no more than what is left of the file.
         self.at += size as usize;
         Ok(())

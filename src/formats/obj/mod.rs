@@ -9,7 +9,7 @@
 mod statements;
 
 use super::finish::{self, BadPoints};
-use super::place::{Place, escape};
+use super::location::{Location, escape};
 use super::words::{float, foreign_number, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
@@ -66,7 +66,7 @@ impl ObjError {
         }
     }
 
-    pub(super) fn place(&self) -> Option<String> {
+    pub(super) fn location(&self) -> Option<String> {
         match self {
             Self::Number { line, .. } | Self::OutOfRange { line, .. } | Self::Syntax { line, .. } => {
                 Some(format!("line {line}"))
@@ -181,7 +181,7 @@ fn check(statements: &Statements, limits: &Limits) -> Result<Geometry, ObjError>
         match statement.kind {
             Kind::Vertex => {
                 let point = point(&statement)?;
-                geometry.bad.check(geometry.points.len(), &point, || Place::Line(statement.line));
+                geometry.bad.check(geometry.points.len(), &point, || Location::Line(statement.line));
                 geometry.points.push(point);
             }
             Kind::Face => {
@@ -304,7 +304,7 @@ mod tests {
             let soup = read(file.as_bytes()).unwrap_or_else(|e| panic!("{bad}: {e}"));
             assert_eq!((soup.triangles().len(), soup.points()[2], soup.points().len()), (3, [1.0, 0.0, 0.0], 6));
             let used = read(format!("{file}f 2 3 -1\nf 2 3 4 5 6\n").as_bytes()).expect_err(bad).reason();
-            assert_eq!((used.code, used.place.as_deref()), (Code::NotFinite, Some("line 7")), "{}", used.message);
+            assert_eq!((used.code, used.location.as_deref()), (Code::NotFinite, Some("line 7")), "{}", used.message);
             assert!(used.message.contains("1 corner is of this sort") && used.message.starts_with("line 7: y of"));
         }
     }

@@ -7,7 +7,8 @@
 //! and other dimensions (`nOFF`) are refused, and so is the binary variant.
 
 use super::finish::{self, BadPoints};
-use super::place::{Place, escape};
+use super::location::{Location, escape};
+use super::value_error::ValueError;
 use super::words::{Uncommented, Words, float, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
@@ -99,7 +100,7 @@ impl OffError {
         }
     }
 
-    pub(super) fn place(&self) -> Option<String> {
+    pub(super) fn location(&self) -> Option<String> {
         let line = match self {
             Self::NotOff { .. } => 1,
             Self::TooMany(_) => return None,
@@ -109,7 +110,7 @@ impl OffError {
             | Self::Value { line, .. }
             | Self::Trailing { line, .. } => *line,
         };
-        Some(Place::Line(line).to_string())
+        Some(Location::Line(line).to_string())
     }
 }
 
@@ -208,18 +209,12 @@ struct File<'a> {
     triangles: Vec<[u32; 3]>,
 }
 
-/// What is wrong with a record.
-enum Fault {
-    /// The file ends.
-    End,
-    Value(String),
-}
-
-impl Fault {
-    fn at(self, element: &'static str, number: u64, count: u64, line: usize) -> OffError {
-        match self {
-            Self::End => OffError::Truncated { element, number, count, line },
-            Self::Value(problem) => OffError::Value { element: format!("{element} {number} (from 0)"), problem, line },
+/// The refusal of a record in which a value is wrong.
+fn refused(error: ValueError, element: &'static str, number: u64, count: u64, line: usize) -> OffError {
+    match error {
+        ValueError::End => OffError::Truncated { element, number, count, line },
+        ValueError::Value(problem) => {
+            OffError::Value { element: format!("{element} {number} (from 0)"), problem, line }
         }
     }
 }
@@ -229,19 +224,19 @@ impl File<'_> {
         // Each takes some bytes, which were counted.
         self.points.reserve_exact(usize::try_from(count).unwrap_or(0));
         for number in 0..count {
-            let point = self.vertex().map_err(|fault| fault.at("vertex", number, count, self.words.line()))?;
-            self.bad.check(self.points.len(), &point, || Place::Line(self.words.line()));
+            let point = self.vertex().map_err(|fault| refused(fault, "vertex", number, count, self.words.line()))?;
+            self.bad.check(self.points.len(), &point, || Location::Line(self.words.line()));
             self.points.push(point);
             self.words.skip_line();
         }
         Ok(())
     }
 
-    fn vertex(&mut self) -> Result<Vec3, Fault> {
+    fn vertex(&mut self) -> Result<Vec3, ValueError> {
         let mut point = [0.0; 3];
         for c in &mut point {
-            let word = self.words.next().ok_or(Fault::End)?;
-            *c = float(word).ok_or_else(|| Fault::Value(no_number(word)))?;
+            let word = self.words.next().ok_or(ValueError::End)?;
+            *c = float(word).ok_or_else(|| ValueError::Value(no_number(word)))?;
         }
         Ok(point)
     }
@@ -249,7 +244,7 @@ impl File<'_> {
     fn faces(&mut self, count: u64, limits: &Limits, notes: &mut Notes) -> Result<(), OffError> {
         let mut corners = Vec::new();
         for number in 0..count {
-            self.corners(&mut corners).map_err(|fault| fault.at("face", number, count, self.words.line()))?;
+            self.corners(&mut corners).map_err(|fault| refused(fault, "face", number, count, self.words.line()))?;
             self.words.skip_line();
             if corners.len() < 3 {
                 notes.skip("face with fewer than three corners", 1);
@@ -265,18 +260,18 @@ impl File<'_> {
     }
 
     /// Reads the corners of a face, which are told after their number.
-    fn corners(&mut self, corners: &mut Vec<u32>) -> Result<(), Fault> {
+    fn corners(&mut self, corners: &mut Vec<u32>) -> Result<(), ValueError> {
         corners.clear();
-        let word = self.words.next().ok_or(Fault::End)?;
+        let word = self.words.next().ok_or(ValueError::End)?;
         let count = integer(word).filter(|n| *n >= 0);
-        let count = count.ok_or_else(|| Fault::Value(format!("\"{}\" is no number of corners", escape(word))))?;
+        let count = count.ok_or_else(|| ValueError::Value(format!("\"{}\" is no number of corners", escape(word))))?;
         for _ in 0..count {
-            let word = self.words.next().ok_or(Fault::End)?;
+            let word = self.words.next().ok_or(ValueError::End)?;
             let corner =
                 integer(word).and_then(|i| u32::try_from(i).ok()).filter(|i| (*i as usize) < self.points.len());
             corners.push(corner.ok_or_else(|| {
                 let points = self.points.len();
-                Fault::Value(format!("\"{}\" is no vertex: there are {points}, counted from 0", escape(word)))
+                ValueError::Value(format!("\"{}\" is no vertex: there are {points}, counted from 0", escape(word)))
             })?);
         }
         Ok(())

@@ -69,9 +69,9 @@ fn broken_files_are_refused_with_code_and_place() {
         (good.replace("1 1 0.5", "1 1 5.0D-01"), Code::Malformed, "line 5", "Fortran exponent"),
         (good.replace("1 1 0.5", "1 1 nan"), Code::NotFinite, "line 5", "1 corner is of this sort"),
     ];
-    for (text, code, place, word) in rows {
+    for (text, code, location, word) in rows {
         let reason = content(&text).expect_err(&text).reason();
-        assert_eq!((reason.code, reason.place.as_deref()), (code, Some(place)), "{reason:?}\n{text}");
+        assert_eq!((reason.code, reason.location.as_deref()), (code, Some(location)), "{reason:?}\n{text}");
         assert!(reason.message.contains(word), "{reason:?}");
     }
     let cloud = content(&square("OFF", &[]));

@@ -1,8 +1,9 @@
 //! Binary values of a PLY file.
 
 use super::header::{Element, Property, Scalar};
-use super::values::{Bad, Values, whole};
-use crate::formats::place::Place;
+use super::values::{Values, whole};
+use crate::formats::location::Location;
+use crate::formats::value_error::ValueError;
 
 /// Bytes of values.
 #[derive(Clone, Copy)]
@@ -19,16 +20,17 @@ impl<'a> Binary<'a> {
         Self { rest: &file[begin..], end: file.len(), big }
     }
 
-    fn take(&mut self, bytes: u64) -> Result<&'a [u8], Bad> {
-        let (taken, rest) = usize::try_from(bytes).ok().and_then(|n| self.rest.split_at_checked(n)).ok_or(Bad::End)?;
+    fn take(&mut self, bytes: u64) -> Result<&'a [u8], ValueError> {
+        let (taken, rest) =
+            usize::try_from(bytes).ok().and_then(|n| self.rest.split_at_checked(n)).ok_or(ValueError::End)?;
         self.rest = rest;
         Ok(taken)
     }
 
     /// The next bytes, the lowest first.
     #[inline]
-    fn array<const N: usize>(&mut self) -> Result<[u8; N], Bad> {
-        let (array, rest) = self.rest.split_first_chunk().ok_or(Bad::End)?;
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], ValueError> {
+        let (array, rest) = self.rest.split_first_chunk().ok_or(ValueError::End)?;
         self.rest = rest;
         Ok(ordered(*array, self.big))
     }
@@ -122,8 +124,8 @@ pub struct Table<'a> {
 
 impl Table<'_> {
     /// Where a record begins in the file.
-    pub fn place(&self, record: usize) -> Place {
-        Place::Byte(self.begin + record * self.stride)
+    pub fn location(&self, record: usize) -> Location {
+        Location::Byte(self.begin + record * self.stride)
     }
 
     /// Three values of each record, at these bytes of it.
@@ -164,8 +166,8 @@ fn ordered<const N: usize>(mut bytes: [u8; N], big: bool) -> [u8; N] {
 }
 
 impl<'a> Values<'a> for Binary<'a> {
-    fn place(&self) -> Place {
-        Place::Byte(self.end - self.rest.len())
+    fn location(&self) -> Location {
+        Location::Byte(self.end - self.rest.len())
     }
 
     fn rest(&self) -> &'a [u8] {
@@ -173,7 +175,7 @@ impl<'a> Values<'a> for Binary<'a> {
     }
 
     #[inline]
-    fn float(&mut self, scalar: Scalar) -> Result<f64, Bad> {
+    fn float(&mut self, scalar: Scalar) -> Result<f64, ValueError> {
         match scalar {
             Scalar::F32 => self.array().map(|b| f64::from(f32::from_le_bytes(b))),
             Scalar::F64 => self.array().map(f64::from_le_bytes),
@@ -182,7 +184,7 @@ impl<'a> Values<'a> for Binary<'a> {
     }
 
     #[inline]
-    fn integer(&mut self, scalar: Scalar) -> Result<i64, Bad> {
+    fn integer(&mut self, scalar: Scalar) -> Result<i64, ValueError> {
         match scalar {
             Scalar::I8 => self.array().map(|b| i64::from(i8::from_le_bytes(b))),
             Scalar::U8 => self.array().map(|b| i64::from(u8::from_le_bytes(b))),
@@ -193,19 +195,19 @@ impl<'a> Values<'a> for Binary<'a> {
             Scalar::I64 => self.array().map(i64::from_le_bytes),
             Scalar::U64 => {
                 let number = u64::from_le_bytes(self.array()?);
-                i64::try_from(number).map_err(|_| Bad::Value(format!("{number} is too large")))
+                i64::try_from(number).map_err(|_| ValueError::Value(format!("{number} is too large")))
             }
             Scalar::F32 | Scalar::F64 => self.float(scalar).and_then(whole),
         }
     }
 
     #[inline]
-    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), Bad> {
-        let bytes = count.checked_mul(scalar.size() as u64).ok_or(Bad::End)?;
+    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), ValueError> {
+        let bytes = count.checked_mul(scalar.size() as u64).ok_or(ValueError::End)?;
         self.take(bytes).map(|_| ())
     }
 
-    fn end_record(&mut self) -> Result<(), Bad> {
+    fn end_record(&mut self) -> Result<(), ValueError> {
         Ok(())
     }
 

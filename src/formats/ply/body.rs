@@ -3,9 +3,10 @@
 use super::PlyError;
 use super::binary::Plain;
 use super::header::{Element, Header, Property};
-use super::values::{Bad, Values};
+use super::values::Values;
 use crate::formats::finish::BadPoints;
-use crate::formats::place::escape;
+use crate::formats::location::escape;
+use crate::formats::value_error::ValueError;
 use crate::formats::{Limits, Notes, TooMany, polygon};
 use planish_core::vec3::Vec3;
 
@@ -125,7 +126,7 @@ impl<'h> Body<'h> {
         list: usize,
         values: &mut impl Values<'a>,
         corners: &mut Vec<u32>,
-    ) -> Result<(), Bad> {
+    ) -> Result<(), ValueError> {
         corners.clear();
         for (p, property) in element.properties.iter().enumerate() {
             let length = length(property, values)?;
@@ -140,13 +141,13 @@ impl<'h> Body<'h> {
         values.end_record()
     }
 
-    fn corner(&self, index: i64, element: &Element) -> Result<u32, Bad> {
+    fn corner(&self, index: i64, element: &Element) -> Result<u32, ValueError> {
         let restart = index == -1 && element.name == "tristrips";
         let found = u32::try_from(index).ok().filter(|i| (*i as usize) < self.points.len());
         let points = self.points.len();
-        found
-            .or(restart.then_some(RESTART))
-            .ok_or_else(|| Bad::Value(format!("vertex {index} is named, but there are {points} (counted from 0)")))
+        found.or(restart.then_some(RESTART)).ok_or_else(|| {
+            ValueError::Value(format!("vertex {index} is named, but there are {points} (counted from 0)"))
+        })
     }
 
     #[inline]
@@ -176,19 +177,19 @@ impl<'h> Body<'h> {
 }
 
 /// What is wrong with a value, with its place.
-fn told<'a>(bad: Bad, element: &Element, number: u64, values: &impl Values<'a>) -> PlyError {
-    let (element, count, place) = (element.name.clone(), element.count, values.place());
+fn told<'a>(bad: ValueError, element: &Element, number: u64, values: &impl Values<'a>) -> PlyError {
+    let (element, count, location) = (element.name.clone(), element.count, values.location());
     match bad {
-        Bad::End => PlyError::Truncated { element, number, count, place },
-        Bad::Value(problem) => PlyError::Value { element, number, problem, place },
+        ValueError::End => PlyError::Truncated { element, number, count, location },
+        ValueError::Value(problem) => PlyError::Value { element, number, problem, location },
     }
 }
 
 /// How many values a property has here, all of which have room in what is left.
-fn length<'a>(property: &Property, values: &mut impl Values<'a>) -> Result<u64, Bad> {
+fn length<'a>(property: &Property, values: &mut impl Values<'a>) -> Result<u64, ValueError> {
     let Some(count) = property.count else { return Ok(1) };
     let length = values.integer(count)?;
-    u64::try_from(length).map_err(|_| Bad::Value(format!("a list has the length {length}")))
+    u64::try_from(length).map_err(|_| ValueError::Value(format!("a list has the length {length}")))
 }
 
 /// Passes over all records of an element.
@@ -203,7 +204,7 @@ fn skip<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<(), PlyEr
     Ok(())
 }
 
-fn skip_record<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<(), Bad> {
+fn skip_record<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<(), ValueError> {
     for property in &element.properties {
         let length = length(property, values)?;
         values.skip(property.scalar, length)?;
@@ -229,21 +230,21 @@ fn read_points<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<(V
     if let Some(table) = values.binary().and_then(|binary| binary.table(element)) {
         let offset = |axis: usize| element.properties[..axis].iter().map(|p| p.scalar.size()).sum();
         let points = table.vectors(axes.map(|a| (offset(a), element.properties[a].scalar)));
-        points.iter().enumerate().for_each(|(number, point)| bad.check(number, point, || table.place(number)));
+        points.iter().enumerate().for_each(|(number, point)| bad.check(number, point, || table.location(number)));
         return Ok((points, bad));
     }
     // Each point takes at least three bytes, which were counted.
     let mut points = Vec::with_capacity(usize::try_from(element.count).unwrap_or(0));
     for number in 0..element.count {
-        let place = values.place();
+        let location = values.location();
         let point = read_point(element, axes, values).map_err(|bad| told(bad, element, number, values))?;
-        bad.check(points.len(), &point, || if values.binary().is_some() { place } else { values.place() });
+        bad.check(points.len(), &point, || if values.binary().is_some() { location } else { values.location() });
         points.push(point);
     }
     Ok((points, bad))
 }
 
-fn read_point<'a>(element: &Element, axes: [usize; 3], values: &mut impl Values<'a>) -> Result<Vec3, Bad> {
+fn read_point<'a>(element: &Element, axes: [usize; 3], values: &mut impl Values<'a>) -> Result<Vec3, ValueError> {
     let mut point = [0.0; 3];
     for (p, property) in element.properties.iter().enumerate() {
         match axes.iter().position(|a| *a == p) {
@@ -264,5 +265,5 @@ fn end<'a>(values: impl Values<'a>) -> Result<(), PlyError> {
     if rest.is_empty() {
         return Ok(());
     }
-    Err(PlyError::Trailing { bytes: rest.len(), begins: escape(rest), place: values.place() })
+    Err(PlyError::Trailing { bytes: rest.len(), begins: escape(rest), location: values.location() })
 }

@@ -1,7 +1,7 @@
 //! The header of a PLY file: which elements there are, and what each of them holds.
 
 use super::PlyError;
-use crate::formats::place::escape;
+use crate::formats::location::escape;
 pub use crate::formats::scalar::Scalar;
 use crate::formats::words::Words;
 

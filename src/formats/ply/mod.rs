@@ -11,7 +11,7 @@ mod header;
 mod values;
 
 use super::finish;
-use super::place::Place;
+use super::location::Location;
 use super::words::Words;
 use super::{Content, Notes, ReadError, Source, TooMany};
 use crate::outcome::Code;
@@ -81,7 +81,7 @@ pub enum PlyError {
     TooMany(#[from] TooMany),
     /// The file ends in the middle.
     #[error(
-        "{place}: the file ends in {element} {number} (from 0) of {count} that its header declares; it was cut off or its header is wrong: copy or export it again"
+        "{location}: the file ends in {element} {number} (from 0) of {count} that its header declares; it was cut off or its header is wrong: copy or export it again"
     )]
     Truncated {
         /// The element.
@@ -91,10 +91,10 @@ pub enum PlyError {
         /// How many are declared.
         count: u64,
         /// Where the file ends.
-        place: Place,
+        location: Location,
     },
     /// A value is not what it should be.
-    #[error("{place}: {problem}, in {element} {number} (from 0); correct the header or export the file again")]
+    #[error("{location}: {problem}, in {element} {number} (from 0); correct the header or export the file again")]
     Value {
         /// The element.
         element: String,
@@ -103,11 +103,11 @@ pub enum PlyError {
         /// What is wrong.
         problem: String,
         /// Where.
-        place: Place,
+        location: Location,
     },
     /// There is more than the header declares.
     #[error(
-        "{place}: {bytes} bytes (\"{begins}\") follow all that the header declares; correct its counts, cut the file off there, or export it again"
+        "{location}: {bytes} bytes (\"{begins}\") follow all that the header declares; correct its counts, cut the file off there, or export it again"
     )]
     Trailing {
         /// How many bytes.
@@ -115,7 +115,7 @@ pub enum PlyError {
         /// What they begin with.
         begins: String,
         /// Where the last record ends.
-        place: Place,
+        location: Location,
     },
 }
 
@@ -129,16 +129,16 @@ impl PlyError {
         }
     }
 
-    pub(super) fn place(&self) -> Option<String> {
+    pub(super) fn location(&self) -> Option<String> {
         match self {
-            Self::NotPly { .. } => Some(Place::Line(1).to_string()),
+            Self::NotPly { .. } => Some(Location::Line(1).to_string()),
             Self::NoElement | Self::TooMany(_) => None,
             Self::Header { line, .. }
             | Self::HeaderEnds { line, .. }
             | Self::NoProperty { line, .. }
-            | Self::Count { line, .. } => Some(Place::Line(*line).to_string()),
-            Self::Truncated { place, .. } | Self::Value { place, .. } | Self::Trailing { place, .. } => {
-                Some(place.to_string())
+            | Self::Count { line, .. } => Some(Location::Line(*line).to_string()),
+            Self::Truncated { location, .. } | Self::Value { location, .. } | Self::Trailing { location, .. } => {
+                Some(location.to_string())
             }
         }
     }

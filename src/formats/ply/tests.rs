@@ -178,9 +178,9 @@ fn broken_files_are_refused_with_code_and_place() {
         (good.replace("1 1 0", "1 0,5 0"), Code::Malformed, Some("line 12"), "decimal comma"),
         (good.replace("1 1 0", "1 1.0D+00 0"), Code::Malformed, Some("line 12"), "Fortran exponent"),
     ];
-    for (text, code, place, word) in rows {
+    for (text, code, location, word) in rows {
         let reason = content(text.as_bytes()).expect_err(&text).reason();
-        assert_eq!((reason.code, reason.place.as_deref()), (code, place), "{reason:?}\n{text}");
+        assert_eq!((reason.code, reason.location.as_deref()), (code, location), "{reason:?}\n{text}");
         assert!(reason.message.contains(word), "{reason:?}");
     }
     let cloud = square(&[]);
@@ -214,14 +214,14 @@ fn broken_binary_files_are_refused_with_their_byte() {
     let mut nan = good.clone();
     nan[header + 16..header + 20].copy_from_slice(&f32::NAN.to_be_bytes());
     let nan = content(&nan).expect_err("a corner").reason();
-    assert_eq!((nan.code, nan.place), (Code::NotFinite, Some(format!("byte {}", header + 12))), "{}", nan.message);
+    assert_eq!((nan.code, nan.location), (Code::NotFinite, Some(format!("byte {}", header + 12))), "{}", nan.message);
     assert!(nan.message.contains("y of point 1 (from 0) is NaN"), "{}", nan.message);
     let range = with(48 + 1, &4u32.to_be_bytes());
-    assert!(matches!(&range, PlyError::Value { number: 0, place: Place::Byte(_), .. }), "{range:?}");
+    assert!(matches!(&range, PlyError::Value { number: 0, location: Location::Byte(_), .. }), "{range:?}");
     let length = with(48 + 13, &[200]);
     assert!(matches!(&length, PlyError::Value { number: 1, .. } | PlyError::Truncated { number: 1, .. }), "{length:?}");
     let longer = error(&[&good[..], b"\0"].concat());
-    assert_eq!(longer, PlyError::Trailing { bytes: 1, begins: "\\0".into(), place: Place::Byte(good.len()) });
+    assert_eq!(longer, PlyError::Trailing { bytes: 1, begins: "\\0".into(), location: Location::Byte(good.len()) });
 }
 
 #[test]

@@ -2,44 +2,29 @@
 
 use super::binary::Binary;
 use super::header::Scalar;
-use crate::formats::place::{Place, escape};
+use crate::formats::location::{Location, escape};
+use crate::formats::value_error::ValueError;
 use crate::formats::words::{Words, float, integer, no_number};
-
-/// What is wrong with a value.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Bad {
-    /// The file ends before it.
-    End,
-    /// It is not what it should be.
-    Value(String),
-}
-
-impl Bad {
-    /// A number that is to be a whole one, and is none.
-    pub fn broken(number: f64) -> Self {
-        Self::Value(format!("{number} is no whole number"))
-    }
-}
 
 /// Values, one after the other.
 pub trait Values<'a>: Copy {
     /// Where the next one is, or the last one.
-    fn place(&self) -> Place;
+    fn location(&self) -> Location;
 
     /// What is left.
     fn rest(&self) -> &'a [u8];
 
     /// The next value.
-    fn float(&mut self, scalar: Scalar) -> Result<f64, Bad>;
+    fn float(&mut self, scalar: Scalar) -> Result<f64, ValueError>;
 
     /// The next value, which must be a whole number, of whatever type.
-    fn integer(&mut self, scalar: Scalar) -> Result<i64, Bad>;
+    fn integer(&mut self, scalar: Scalar) -> Result<i64, ValueError>;
 
     /// Passes over values.
-    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), Bad>;
+    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), ValueError>;
 
     /// Ends a record.
-    fn end_record(&mut self) -> Result<(), Bad>;
+    fn end_record(&mut self) -> Result<(), ValueError>;
 
     /// The same, if it is binary, for what can be done at once then.
     fn binary(&mut self) -> Option<&mut Binary<'a>> {
@@ -48,10 +33,10 @@ pub trait Values<'a>: Copy {
 }
 
 /// A whole number among the floats.
-pub fn whole(number: f64) -> Result<i64, Bad> {
+pub fn whole(number: f64) -> Result<i64, ValueError> {
     // Above 2^53 floats do not tell whole numbers apart.
     let fits = number.fract() == 0.0 && number.abs() < 9e15;
-    if fits { Ok(number as i64) } else { Err(Bad::broken(number)) }
+    if fits { Ok(number as i64) } else { Err(ValueError::broken(number)) }
 }
 
 /// Values as text. A record may go on in the next line, but ends with a line.
@@ -60,18 +45,18 @@ pub struct Text<'a>(pub Words<'a>);
 
 impl<'a> Text<'a> {
     #[inline]
-    fn word(&mut self) -> Result<&'a [u8], Bad> {
-        self.0.next().ok_or(Bad::End)
+    fn word(&mut self) -> Result<&'a [u8], ValueError> {
+        self.0.next().ok_or(ValueError::End)
     }
 }
 
-fn not_a_number(word: &[u8]) -> Bad {
-    Bad::Value(no_number(word))
+fn not_a_number(word: &[u8]) -> ValueError {
+    ValueError::Value(no_number(word))
 }
 
 impl<'a> Values<'a> for Text<'a> {
-    fn place(&self) -> Place {
-        Place::Line(self.0.line())
+    fn location(&self) -> Location {
+        Location::Line(self.0.line())
     }
 
     fn rest(&self) -> &'a [u8] {
@@ -79,25 +64,25 @@ impl<'a> Values<'a> for Text<'a> {
     }
 
     #[inline]
-    fn float(&mut self, _: Scalar) -> Result<f64, Bad> {
+    fn float(&mut self, _: Scalar) -> Result<f64, ValueError> {
         let word = self.word()?;
         float(word).ok_or_else(|| not_a_number(word))
     }
 
     #[inline]
-    fn integer(&mut self, _: Scalar) -> Result<i64, Bad> {
+    fn integer(&mut self, _: Scalar) -> Result<i64, ValueError> {
         let word = self.word()?;
         integer(word).map_or_else(|| whole(float(word).ok_or_else(|| not_a_number(word))?), Ok)
     }
 
-    fn skip(&mut self, _: Scalar, count: u64) -> Result<(), Bad> {
+    fn skip(&mut self, _: Scalar, count: u64) -> Result<(), ValueError> {
         (0..count).try_for_each(|_| self.word().map(|_| ()))
     }
 
-    fn end_record(&mut self) -> Result<(), Bad> {
+    fn end_record(&mut self) -> Result<(), ValueError> {
         match self.0.next_in_line() {
             None => Ok(()),
-            Some(word) => Err(Bad::Value(format!("\"{}\" follows the last of its values", escape(word)))),
+            Some(word) => Err(ValueError::Value(format!("\"{}\" follows the last of its values", escape(word)))),
         }
     }
 }

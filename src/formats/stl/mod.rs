@@ -8,7 +8,7 @@
 //! is told; text that ends in a facet is refused.
 
 use super::finish::{self, BadPoints};
-use super::place::{Place, escape};
+use super::location::{Location, escape};
 use super::words::{float, foreign_number, no_number};
 use super::{Content, Notes, ReadError, Source, TooMany};
 use crate::outcome::Code;
@@ -94,7 +94,7 @@ impl StlError {
         }
     }
 
-    pub(super) fn place(&self) -> Option<String> {
+    pub(super) fn location(&self) -> Option<String> {
         Some(match self {
             Self::Short { size } => format!("byte {size}"),
             Self::NoSolid { .. } => "line 1".to_owned(),
@@ -202,7 +202,7 @@ fn binary(records: &[u8]) -> Facets {
             let coordinate =
                 |k: usize| f32::from_le_bytes([corner[4 * k], corner[4 * k + 1], corner[4 * k + 2], corner[4 * k + 3]]);
             let point = [0, 1, 2].map(|k| f64::from(coordinate(k)));
-            facets.bad.check(facets.corners.len(), &point, || Place::Byte(HEADER + RECORD * triangle));
+            facets.bad.check(facets.corners.len(), &point, || Location::Byte(HEADER + RECORD * triangle));
             facets.corners.push(point);
         }
     }
@@ -288,7 +288,7 @@ fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Facets, StlError
             }
             (b"vertex", Some(n)) if n < 3 => {
                 let point = vertex(&mut words)?;
-                facets.bad.check(facets.corners.len(), &point, || Place::Line(words.line));
+                facets.bad.check(facets.corners.len(), &point, || Location::Line(words.line));
                 facets.corners.push(point);
                 corners = Some(n + 1);
             }

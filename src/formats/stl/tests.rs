@@ -128,11 +128,11 @@ fn broken_numbers_are_named_with_their_place() {
     bad[4] = f32::NAN;
     let refused = |bytes: &[u8]| read(bytes).expect_err("a corner").reason();
     let reason = refused(&binary_file(b"", 3, &[TRIANGLE, bad, bad]));
-    assert_eq!((reason.code, reason.place.as_deref()), (Code::NotFinite, Some("byte 134")));
+    assert_eq!((reason.code, reason.location.as_deref()), (Code::NotFinite, Some("byte 134")));
     assert!(reason.message.contains("y of point 4 (from 0) is NaN, and triangle 1 has a corner there"), "{reason:?}");
     assert!(reason.message.contains("2 corners are of this sort") && reason.message.contains("in 2 triangles"));
     let reason = refused(format!("solid\n{}endsolid", facet("inf")).as_bytes());
-    assert_eq!((reason.code, reason.place.as_deref()), (Code::NotFinite, Some("line 4")));
+    assert_eq!((reason.code, reason.location.as_deref()), (Code::NotFinite, Some("line 4")));
     let ascii = |x| error(format!("solid\n{}endsolid", facet(x)).as_bytes());
     for (word, told) in [("1,5", "decimal comma"), ("1.5D+00", "Fortran exponent"), ("x", "\"x\" is no number;")] {
         assert!(ascii(word).to_string().contains(told), "{}", ascii(word));
@@ -150,7 +150,7 @@ fn numbers_that_are_none_are_passed_over_in_normals_only() {
         let file = |facet: String| format!("solid\n{facet}endsolid").into_bytes();
         assert!(read(&file(facet("0").replace("normal 0 0 1", &normal))).is_ok(), "{broken}");
         let found = read(&file(facet(broken))).expect_err(broken).reason();
-        assert_eq!((found.code, found.place.as_deref()), (Code::NotFinite, Some("line 4")), "{broken}");
+        assert_eq!((found.code, found.location.as_deref()), (Code::NotFinite, Some("line 4")), "{broken}");
     }
     assert!(read(b"solid\nfacet normal a b c").is_err());
 }
@@ -171,7 +171,7 @@ fn text_of_another_kind_is_told() {
     let found = error(format!("# by hand\nsolid\n{}endsolid\n", facet("0")).as_bytes());
     let StlError::NoSolid { begins } = &found else { panic!("{found}") };
     assert!(begins.starts_with("# by hand"));
-    assert_eq!((found.code(), found.place().as_deref()), (Code::Malformed, Some("line 1")));
+    assert_eq!((found.code(), found.location().as_deref()), (Code::Malformed, Some("line 1")));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Why bytes are no VTK file.
 
-pub(super) use crate::formats::place::{Place, escape};
+pub(super) use crate::formats::location::{Location, escape};
 use crate::outcome::Code;
 
 /// Why bytes are no VTK file, or none with a surface.
@@ -15,10 +15,10 @@ pub enum VtkError {
         found: String,
     },
     /// Another kind of data set.
-    #[error("{place}: the file holds {dataset}, {what}; {remedy}")]
+    #[error("{location}: the file holds {dataset}, {what}; {remedy}")]
     Dataset {
         /// Where it is said.
-        place: Place,
+        location: Location,
         /// VTK's name.
         dataset: String,
         /// What that is.
@@ -28,11 +28,11 @@ pub enum VtkError {
     },
     /// Fewer values than declared.
     #[error(
-        "{place}: {what} should have {declared} values, but there are only {there}; the file was cut off or its counts are wrong: copy or save it again"
+        "{location}: {what} should have {declared} values, but there are only {there}; the file was cut off or its counts are wrong: copy or save it again"
     )]
     Count {
         /// Where they are declared, or begin.
-        place: Place,
+        location: Location,
         /// Of what.
         what: String,
         /// How many are declared.
@@ -41,10 +41,10 @@ pub enum VtkError {
         there: u64,
     },
     /// More elements than the limit.
-    #[error("{place}: {declared} {what} exceed the limit of {limit}; split or decimate the surface")]
+    #[error("{location}: {declared} {what} exceed the limit of {limit}; split or decimate the surface")]
     TooLarge {
         /// Where they are declared.
-        place: Place,
+        location: Location,
         /// Of what.
         what: &'static str,
         /// How many are declared.
@@ -53,18 +53,18 @@ pub enum VtkError {
         limit: u64,
     },
     /// Something that VTK would not write.
-    #[error("{place}: {problem}; correct it or save the file again")]
+    #[error("{location}: {problem}; correct it or save the file again")]
     Syntax {
         /// Where.
-        place: Place,
+        location: Location,
         /// What is wrong.
         problem: String,
     },
     /// An array cannot be decoded.
-    #[error("{place}: {what} cannot be decoded: {problem}")]
+    #[error("{location}: {what} cannot be decoded: {problem}")]
     Packed {
         /// Where the array begins.
-        place: Place,
+        location: Location,
         /// Which array.
         what: String,
         /// What is wrong, and what to do.
@@ -159,14 +159,14 @@ impl VtkError {
         }
     }
 
-    pub(in crate::formats) fn place(&self) -> Option<String> {
+    pub(in crate::formats) fn location(&self) -> Option<String> {
         match self {
             Self::NoVtk { .. } => Some("byte 0".to_owned()),
-            Self::Dataset { place, .. }
-            | Self::Count { place, .. }
-            | Self::TooLarge { place, .. }
-            | Self::Syntax { place, .. }
-            | Self::Packed { place, .. } => Some(place.to_string()),
+            Self::Dataset { location, .. }
+            | Self::Count { location, .. }
+            | Self::TooLarge { location, .. }
+            | Self::Syntax { location, .. }
+            | Self::Packed { location, .. } => Some(location.to_string()),
             Self::OutOfRange { cell, section, .. }
             | Self::Corners { cell, section, .. }
             | Self::Offset { cell, section, .. } => Some(format!("{section}, cell {cell}")),

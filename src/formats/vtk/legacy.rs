@@ -18,11 +18,11 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let mut file = Arrays::new(source.bytes);
     let format = header(&mut file)?;
     let mut surface = Surface::new(source.limits, format);
-    let place = file.place();
+    let location = file.location();
     match file.keyword()?.as_deref() {
         Some(b"POLYDATA") => polydata(&mut file, &mut surface)?,
         Some(b"UNSTRUCTURED_GRID") => unstructured_grid(&mut file, &mut surface)?,
-        Some(other) => return Err(unsupported(place, &escape(other)).into()),
+        Some(other) => return Err(unsupported(location, &escape(other)).into()),
         None => return Err(file.ends("the kind of the data set").into()),
     }
     surface.finish()
@@ -33,13 +33,13 @@ fn header(file: &mut Arrays) -> Result<String, VtkError> {
     let first = file.text.line().unwrap_or_default();
     let version = escape(first.get(HEAD.len()..).unwrap_or_default().trim_ascii());
     file.text.line();
-    let place = file.place();
+    let location = file.location();
     let encoding = match file.keyword()?.as_deref() {
         Some(b"ASCII") => "ASCII",
         Some(b"BINARY") => "binary",
         Some(other) => {
             let problem = format!("\"{}\" stands where ASCII or BINARY is expected", escape(other));
-            return Err(VtkError::Syntax { place, problem });
+            return Err(VtkError::Syntax { location, problem });
         }
         None => return Err(file.ends("ASCII or BINARY")),
     };
@@ -121,13 +121,13 @@ fn unstructured_grid(file: &mut Arrays, surface: &mut Surface) -> Result<(), Vtk
         }
     }
     let ((corners, ends), types) = (cells.unwrap_or_default(), types.unwrap_or_default());
-    let place = || file.place_at(at);
+    let location = || file.place_at(at);
     if types.len() != ends.len() {
         let (declared, there) = (ends.len() as u64, types.len() as u64);
-        return Err(VtkError::Count { place: place(), what: "CELL_TYPES".to_owned(), declared, there });
+        return Err(VtkError::Count { location: location(), what: "CELL_TYPES".to_owned(), declared, there });
     }
     let types = Types::Each(&types);
-    surface.add_cells(&Cells { section: "CELLS", types, corners: &corners, ends: &ends }, place)
+    surface.add_cells(&Cells { section: "CELLS", types, corners: &corners, ends: &ends }, location)
 }
 
 #[cfg(test)]
@@ -361,7 +361,7 @@ mod tests {
         for dataset in ["STRUCTURED_GRID", "STRUCTURED_POINTS", "RECTILINEAR_GRID"] {
             let refused = error(&File::new("3.0", false, dataset).text("DIMENSIONS 1 1 1\n").bytes);
             let reason = ReadError::from(refused).reason();
-            assert_eq!((reason.code, reason.place.as_deref()), (Code::UnsupportedFormat, Some("line 4")));
+            assert_eq!((reason.code, reason.location.as_deref()), (Code::UnsupportedFormat, Some("line 4")));
             assert!(reason.message.contains(dataset) && reason.message.contains("Extract Surface"), "{reason:?}");
         }
         let volume = File::new("3.0", true, "UNSTRUCTURED_GRID").square().cells("CELLS", false, &[&[0, 1, 2, 3]]);

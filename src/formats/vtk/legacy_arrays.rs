@@ -1,6 +1,6 @@
 //! The arrays of a legacy file: numbers in text, or big-endian.
 
-use super::error::{Place, VtkError, escape};
+use super::error::{Location, VtkError, escape};
 use super::scalar::{Order, Scalar};
 use super::text::Text;
 use planish_core::vec3::Vec3;
@@ -32,13 +32,13 @@ impl<'a> Arrays<'a> {
     }
 
     /// Where the file is read.
-    pub fn place(&self) -> Place {
+    pub fn location(&self) -> Location {
         self.place_at(self.text.at)
     }
 
     /// The place of a byte. Binary arrays hold bytes that look like ends of lines.
-    pub fn place_at(&self, at: usize) -> Place {
-        if self.binary { Place::Byte(at) } else { Place::line_of(self.text.bytes, at) }
+    pub fn place_at(&self, at: usize) -> Location {
+        if self.binary { Location::Byte(at) } else { Location::line_of(self.text.bytes, at) }
     }
 
     /// The next keyword, in upper case, after what is told about the array before it.
@@ -66,7 +66,7 @@ impl<'a> Arrays<'a> {
     }
 
     fn syntax(&self, problem: String) -> VtkError {
-        VtkError::Syntax { place: self.place(), problem }
+        VtkError::Syntax { location: self.location(), problem }
     }
 
     /// A number of elements.
@@ -109,7 +109,7 @@ impl<'a> Arrays<'a> {
         let rest = self.text.rest();
         let there = rest.len() as u64 / size;
         if count > there {
-            return Err(VtkError::Count { place: self.place(), what: what.to_owned(), declared: count, there });
+            return Err(VtkError::Count { location: self.location(), what: what.to_owned(), declared: count, there });
         }
         let taken = &rest[..(count * size) as usize];
         self.text.at += taken.len();
@@ -122,7 +122,12 @@ impl<'a> Arrays<'a> {
         let count = self.count("points")?;
         let scalar = self.number_kind("coordinates")?;
         if count > most {
-            return Err(VtkError::TooLarge { place: self.place_at(at), what: "points", declared: count, limit: most });
+            return Err(VtkError::TooLarge {
+                location: self.place_at(at),
+                what: "points",
+                declared: count,
+                limit: most,
+            });
         }
         if !self.binary {
             return self.text.points("POINTS", count);
@@ -138,8 +143,8 @@ impl<'a> Arrays<'a> {
         let start = self.text.at;
         let bytes = self.bytes(what, count, scalar.bytes())?;
         scalar.ids(bytes, Order::Big).map_err(|bad| {
-            let place = Place::Byte(start + bad.entry * scalar.size());
-            VtkError::Syntax { place, problem: format!("{what} hold the number {}, which is no id", bad.value) }
+            let location = Location::Byte(start + bad.entry * scalar.size());
+            VtkError::Syntax { location, problem: format!("{what} hold the number {}, which is no id", bad.value) }
         })
     }
 
@@ -167,7 +172,7 @@ impl<'a> Arrays<'a> {
         let list = self.ids(section, size, Scalar::I32)?;
         split(&list, count).ok_or_else(|| {
             let problem = format!("{section}: {size} numbers are not those of {count} cells with the count of each");
-            VtkError::Syntax { place: self.place_at(at), problem }
+            VtkError::Syntax { location: self.place_at(at), problem }
         })
     }
 

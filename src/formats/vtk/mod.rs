@@ -22,7 +22,7 @@ mod xml_outline;
 mod xml_tests;
 
 use super::{Content, ReadError, Source};
-use error::Place;
+use error::Location;
 pub use error::VtkError;
 
 /// Reads a file of VTK.
@@ -41,7 +41,7 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
 }
 
 /// The refusal of a data set that is no surface.
-fn unsupported(place: Place, dataset: &str) -> VtkError {
+fn unsupported(location: Location, dataset: &str) -> VtkError {
     let plain = dataset.trim_start_matches("vtk").replace('_', "").to_ascii_lowercase();
     let (what, remedy) = match plain.as_str() {
         "structuredgrid" | "structuredpoints" | "rectilineargrid" | "imagedata" | "hypertreegrid" => (
@@ -59,5 +59,5 @@ fn unsupported(place: Place, dataset: &str) -> VtkError {
         }
         _ => ("which is no surface", "save a surface as POLYDATA or UNSTRUCTURED_GRID: .vtp, .vtu or .vtk"),
     };
-    VtkError::Dataset { place, dataset: dataset.to_owned(), what, remedy }
+    VtkError::Dataset { location, dataset: dataset.to_owned(), what, remedy }
 }

@@ -1,7 +1,7 @@
 //! The surface as it grows, piece by piece and cell by cell.
 
 use super::cell::{self, Kind};
-use super::error::{Place, VtkError};
+use super::error::{Location, VtkError};
 use crate::formats::finish::{self, BadPoints};
 use crate::formats::{Content, Limits, Notes, ReadError, polygon};
 use planish_core::vec3::Vec3;
@@ -54,10 +54,15 @@ impl<'a> Surface<'a> {
     }
 
     /// Begins a piece with these points. (Places are told when it comes to it: to count lines takes time.)
-    pub fn add_points(&mut self, points: Vec<Vec3>, place: impl FnOnce() -> Place) -> Result<(), VtkError> {
+    pub fn add_points(&mut self, points: Vec<Vec3>, location: impl FnOnce() -> Location) -> Result<(), VtkError> {
         let declared = (self.points.len() + points.len()) as u64;
         if points.len() as u64 > self.room_for_points() {
-            return Err(VtkError::TooLarge { place: place(), what: "points", declared, limit: self.limits.elements });
+            return Err(VtkError::TooLarge {
+                location: location(),
+                what: "points",
+                declared,
+                limit: self.limits.elements,
+            });
         }
         self.base = self.points.len();
         if self.points.is_empty() {
@@ -74,7 +79,7 @@ impl<'a> Surface<'a> {
     }
 
     /// Adds the triangles of cells of the piece at hand.
-    pub fn add_cells(&mut self, cells: &Cells, place: impl FnOnce() -> Place) -> Result<(), VtkError> {
+    pub fn add_cells(&mut self, cells: &Cells, location: impl FnOnce() -> Location) -> Result<(), VtkError> {
         if !matches!(cells.types, Types::All(cell::STRIP)) {
             self.triangles.reserve(cells.ends.len().min(cells.corners.len() / 3));
         }
@@ -91,7 +96,7 @@ impl<'a> Surface<'a> {
             self.add(cell_type, corners).map_err(|problem| problem.at(cell, cells.section))?;
             if self.triangles.len() as u64 > self.limits.elements {
                 let (declared, limit) = (self.triangles.len() as u64, self.limits.elements);
-                return Err(VtkError::TooLarge { place: place(), what: "triangles", declared, limit });
+                return Err(VtkError::TooLarge { location: location(), what: "triangles", declared, limit });
             }
             start = *end as usize;
         }
@@ -199,10 +204,10 @@ mod tests {
         let mut surface = Surface::new(&limits, "VTK".to_owned());
         // A piece of its own comes first: cells count from the second.
         for _ in 0..2 {
-            surface.add_points([SQUARE, SQUARE, SQUARE].concat(), || Place::Line(1))?;
+            surface.add_points([SQUARE, SQUARE, SQUARE].concat(), || Location::Line(1))?;
         }
         let (types, ends) = (Types::All(cell_type), [corners.len() as u32]);
-        surface.add_cells(&Cells { section: "CELLS", types, corners, ends: &ends }, || Place::Line(2))?;
+        surface.add_cells(&Cells { section: "CELLS", types, corners, ends: &ends }, || Location::Line(2))?;
         surface.finish()
     }
 
@@ -264,9 +269,12 @@ mod tests {
         let limits = Limits { elements: 5, ..Limits::default() };
         for ends in [&[3, 2, 6][..], &[3, 7], &[7]] {
             let mut surface = Surface::new(&limits, "VTK".to_owned());
-            surface.add_points(SQUARE.to_vec(), || Place::Line(1)).expect("few");
+            surface.add_points(SQUARE.to_vec(), || Location::Line(1)).expect("few");
             let cells = Cells { section: "Polys", types: Types::All(7), corners: &[0, 1, 2, 2, 1, 3], ends };
-            assert!(matches!(surface.add_cells(&cells, || Place::Line(2)), Err(VtkError::Offset { .. })), "{ends:?}");
+            assert!(
+                matches!(surface.add_cells(&cells, || Location::Line(2)), Err(VtkError::Offset { .. })),
+                "{ends:?}"
+            );
         }
     }
 
@@ -274,11 +282,11 @@ mod tests {
     fn limits_hold_for_all_pieces_together() {
         let limits = Limits { elements: 5, ..Limits::default() };
         let mut surface = Surface::new(&limits, "VTK".to_owned());
-        surface.add_points(SQUARE.to_vec(), || Place::Line(1)).expect("few");
+        surface.add_points(SQUARE.to_vec(), || Location::Line(1)).expect("few");
         let corners: Vec<u32> = [0, 1, 2].repeat(6);
         let cells = Cells { section: "Polys", types: Types::All(7), corners: &corners, ends: &[3, 6, 9, 12, 15, 18] };
-        let error = surface.add_cells(&cells, || Place::Line(2)).expect_err("too many");
-        assert_eq!(error, VtkError::TooLarge { place: Place::Line(2), what: "triangles", declared: 6, limit: 5 });
-        assert!(matches!(surface.add_points(SQUARE.to_vec(), || Place::Line(1)), Err(VtkError::TooLarge { .. })));
+        let error = surface.add_cells(&cells, || Location::Line(2)).expect_err("too many");
+        assert_eq!(error, VtkError::TooLarge { location: Location::Line(2), what: "triangles", declared: 6, limit: 5 });
+        assert!(matches!(surface.add_points(SQUARE.to_vec(), || Location::Line(1)), Err(VtkError::TooLarge { .. })));
     }
 }

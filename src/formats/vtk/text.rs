@@ -1,6 +1,6 @@
 //! Words and numbers of text, with the place of what is wrong.
 
-use super::error::{Place, VtkError, escape};
+use super::error::{Location, VtkError, escape};
 use crate::formats::words::{float, remedy};
 use planish_core::vec3::Vec3;
 
@@ -20,8 +20,8 @@ impl<'a> Text<'a> {
     }
 
     /// The line that is read.
-    pub fn place(&self) -> Place {
-        Place::line_of(self.bytes, self.at)
+    pub fn location(&self) -> Location {
+        Location::line_of(self.bytes, self.at)
     }
 
     /// Passes over blanks and ends of lines.
@@ -49,7 +49,7 @@ impl<'a> Text<'a> {
 
     /// The error that something makes no sense here.
     pub fn syntax(&self, problem: impl Into<String>) -> VtkError {
-        VtkError::Syntax { place: self.place(), problem: problem.into() }
+        VtkError::Syntax { location: self.location(), problem: problem.into() }
     }
 
     /// Text may hold so many numbers: each takes a blank and a digit.
@@ -58,7 +58,7 @@ impl<'a> Text<'a> {
         if declared <= there {
             return Ok(());
         }
-        Err(VtkError::Count { place: self.place(), what: what.to_owned(), declared, there })
+        Err(VtkError::Count { location: self.location(), what: what.to_owned(), declared, there })
     }
 
     /// This many points.
@@ -87,6 +87,6 @@ impl<'a> Text<'a> {
     }
 
     fn count(&self, what: &str, declared: u64, there: u64) -> VtkError {
-        VtkError::Count { place: self.place(), what: what.to_owned(), declared, there }
+        VtkError::Count { location: self.location(), what: what.to_owned(), declared, there }
     }
 }

@@ -1,6 +1,6 @@
 //! VTK XML files: `.vtu` and `.vtp`, in every encoding.
 
-use super::error::{Place, VtkError};
+use super::error::{Location, VtkError};
 use super::packed::{Budget, Compressor, Packing, Stream, unpack};
 use super::scalar::Order;
 use super::surface::{Cells, Surface, Types};
@@ -76,16 +76,16 @@ impl<'a> Arrays<'a> {
     /// Adds the surface of a piece.
     fn piece(&mut self, piece: &Piece<'a>, surface: &mut Surface) -> Result<(), VtkError> {
         let bytes = self.bytes;
-        let place = || Place::line_of(bytes, piece.at);
+        let location = || Location::line_of(bytes, piece.at);
         if piece.points > surface.room_for_points() {
             let limit = surface.room_for_points();
-            return Err(VtkError::TooLarge { place: place(), what: "points", declared: piece.points, limit });
+            return Err(VtkError::TooLarge { location: location(), what: "points", declared: piece.points, limit });
         }
         let points = match piece.array(Role::Points) {
             Some(array) => self.points(&array, piece.points)?,
             None => Vec::new(),
         };
-        surface.add_points(points, place)?;
+        surface.add_points(points, location)?;
         for (section, count) in Section::ALL.into_iter().zip(piece.cells) {
             match section {
                 _ if count == 0 => {}
@@ -119,7 +119,7 @@ impl<'a> Arrays<'a> {
             }
         };
         let cells = Cells { section: section.name(), types, corners: &corners, ends: &ends };
-        surface.add_cells(&cells, || Place::line_of(self.bytes, piece.at))
+        surface.add_cells(&cells, || Location::line_of(self.bytes, piece.at))
     }
 
     /// The first `count` points of an array.
@@ -127,7 +127,7 @@ impl<'a> Arrays<'a> {
         let name = Role::Points.name();
         if let Some(components) = array.components.filter(|c| *c != 3) {
             let problem = format!("Points have {components} components instead of 3");
-            return Err(VtkError::Syntax { place: Place::line_of(self.bytes, array.at), problem });
+            return Err(VtkError::Syntax { location: Location::line_of(self.bytes, array.at), problem });
         }
         if let Data::Ascii(bytes, at) = array.data {
             return Text { bytes, at }.points(&name, count);
@@ -142,8 +142,8 @@ impl<'a> Arrays<'a> {
     fn ids(&mut self, piece: &Piece<'a>, role: Role, count: u64) -> Result<Vec<u32>, VtkError> {
         let name = role.name();
         let Some(array) = piece.array(role) else {
-            let place = Place::line_of(self.bytes, piece.at);
-            return Err(VtkError::Count { place, what: name, declared: count, there: 0 });
+            let location = Location::line_of(self.bytes, piece.at);
+            return Err(VtkError::Count { location, what: name, declared: count, there: 0 });
         };
         if let Data::Ascii(bytes, at) = array.data {
             return Text { bytes, at }.ids(&name, count);
@@ -153,7 +153,7 @@ impl<'a> Arrays<'a> {
         let ids = array.scalar.ids(&bytes[..(needed * array.scalar.bytes()) as usize], self.packing.order);
         ids.map_err(|bad| {
             let problem = format!("number {} of {name} is {}, which is no id", bad.entry, bad.value);
-            VtkError::Syntax { place: self.place(&array), problem }
+            VtkError::Syntax { location: self.location(&array), problem }
         })
     }
 
@@ -161,14 +161,14 @@ impl<'a> Arrays<'a> {
         if declared <= there {
             return Ok(declared);
         }
-        Err(VtkError::Count { place: self.place(array), what: name.to_owned(), declared, there })
+        Err(VtkError::Count { location: self.location(array), what: name.to_owned(), declared, there })
     }
 
     /// Where the numbers of an array begin.
-    fn place(&self, array: &Array) -> Place {
+    fn location(&self, array: &Array) -> Location {
         match (array.data, self.appended) {
-            (Data::Appended(offset), Some(appended)) => Place::Byte(appended.at.saturating_add(offset as usize)),
-            _ => Place::line_of(self.bytes, array.at),
+            (Data::Appended(offset), Some(appended)) => Location::Byte(appended.at.saturating_add(offset as usize)),
+            _ => Location::line_of(self.bytes, array.at),
         }
     }
 
@@ -179,20 +179,20 @@ impl<'a> Arrays<'a> {
                 let data = usize::try_from(offset).ok().and_then(|offset| appended.bytes.get(offset..));
                 let Some(data) = data else {
                     let problem = format!("{name} begin at byte {offset} of {} appended bytes", appended.bytes.len());
-                    return Err(VtkError::Syntax { place: Place::line_of(self.bytes, array.at), problem });
+                    return Err(VtkError::Syntax { location: Location::line_of(self.bytes, array.at), problem });
                 };
                 if appended.base64 { Stream::base64(data) } else { Stream::Raw(data) }
             }
             (Data::Appended(_), None) => {
                 let problem = format!("{name} are appended, but there is no <AppendedData>: the file was cut off");
-                return Err(VtkError::Syntax { place: Place::line_of(self.bytes, array.at), problem });
+                return Err(VtkError::Syntax { location: Location::line_of(self.bytes, array.at), problem });
             }
             (Data::Inline(text), _) => Stream::base64_with_blanks(text),
             (Data::Ascii(..), _) => Stream::Raw(&[]),
         };
         unpack(stream, self.packing, &mut self.budget).map_err(|problem| {
-            let (place, what) = (self.place(array), name.to_owned());
-            VtkError::Packed { place, what, problem }
+            let (location, what) = (self.location(array), name.to_owned());
+            VtkError::Packed { location, what, problem }
         })
     }
 }

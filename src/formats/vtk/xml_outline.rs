@@ -3,7 +3,7 @@
 //! Only tags are looked at, one after the other. Appended data end the search: raw ones are no XML.
 
 use super::cell;
-use super::error::{Place, VtkError, escape};
+use super::error::{Location, VtkError, escape};
 use super::packed::{Compressor, Packing};
 use super::scalar::{Order, Scalar};
 use super::unsupported;
@@ -182,16 +182,16 @@ impl<'a> Search<'a> {
         self.reader.buffer_position() as usize
     }
 
-    fn place(&self) -> Place {
-        Place::line_of(self.bytes, self.at())
+    fn location(&self) -> Location {
+        Location::line_of(self.bytes, self.at())
     }
 
     fn syntax(&self, problem: impl Into<String>) -> VtkError {
-        VtkError::Syntax { place: self.place(), problem: problem.into() }
+        VtkError::Syntax { location: self.location(), problem: problem.into() }
     }
 
     fn count(&self, what: String, declared: u64) -> VtkError {
-        VtkError::Count { place: self.place(), what, declared, there: 0 }
+        VtkError::Count { location: self.location(), what, declared, there: 0 }
     }
 
     /// Looks at the next tag or text; whether more may follow.
@@ -208,8 +208,8 @@ impl<'a> Search<'a> {
             Ok(Event::Eof) => return Err(self.syntax("the file ends before </VTKFile>: it was cut off")),
             Ok(_) => {}
             Err(error) => {
-                let place = Place::line_of(self.bytes, self.reader.error_position() as usize);
-                return Err(VtkError::Syntax { place, problem: format!("this is no XML ({error})") });
+                let location = Location::line_of(self.bytes, self.reader.error_position() as usize);
+                return Err(VtkError::Syntax { location, problem: format!("this is no XML ({error})") });
             }
         }
         Ok(true)
@@ -252,7 +252,7 @@ impl<'a> Search<'a> {
             Some("UnstructuredGrid") => ("UnstructuredGrid", "VTU"),
             Some("PolyData") => ("PolyData", "VTP"),
             None => return Err(self.syntax("<VTKFile> has no type")),
-            Some(other) => return Err(unsupported(self.place(), &escape(other.as_bytes()))),
+            Some(other) => return Err(unsupported(self.location(), &escape(other.as_bytes()))),
         });
         self.packing.order = match attribute(tag, "byte_order") {
             Some("BigEndian") => Order::Big,

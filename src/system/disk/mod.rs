@@ -12,16 +12,17 @@
 //! Deliberately absent: writing to a file that has a name in a result or an inbox already. What is replaced is replaced
 //! by a rename.
 
+mod placing;
 #[cfg(test)]
 pub(crate) mod simulated;
 mod system;
 
 use crate::system::fingerprint::Identity;
 use crate::system::safe_open::OpenError;
+pub use placing::{make_unique, make_unique_folder, rename_to_free, replace_file, replace_with, unique_name};
 use rustix::io::Errno;
 use std::ffi::{OsStr, OsString};
 use std::fmt::Debug;
-use std::hash::{BuildHasher, RandomState};
 use std::io::{self, ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 pub use system::System;
@@ -31,12 +32,6 @@ pub const OPEN_FOLDER: u32 = 0o777;
 
 /// As [`OPEN_FOLDER`], of files.
 pub const OPEN_FILE: u32 = 0o666;
-
-/// How the names of files begin that are not complete: hidden, as the desk may be a folder of somebody else's.
-const FRESH: &str = ".planish-fresh-";
-
-/// Names that are tried to find a free one.
-const ATTEMPTS: u32 = 100;
 
 /// Where paths lead to folders.
 pub trait Disk: Clone + Debug + Send + Sync + 'static {
@@ -283,77 +278,6 @@ fn remove_folder<F: Folder>(folder: &F, name: &OsStr) -> io::Result<()> {
         remove_all(&inside, &each)?;
     }
     folder.remove_folder(name)
-}
-
-/// A name that others cannot guess.
-pub fn unique_name(prefix: &str) -> OsString {
-    OsString::from(format!("{prefix}{:016x}", RandomState::new().hash_one(())))
-}
-
-/// Makes something under a new name, which begins like this.
-///
-/// # Errors
-/// Those of `make`.
-pub fn make_unique<T>(prefix: &str, make: impl Fn(&OsStr) -> io::Result<T>) -> io::Result<(OsString, T)> {
-    for _ in 0..ATTEMPTS {
-        let name = unique_name(prefix);
-        match make(&name) {
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            made => return Ok((name, made?)),
-        }
-    }
-    Err(Errno::EXIST.into())
-}
-
-/// Makes a folder under a new name, which begins like this.
-///
-/// # Errors
-/// Those of the system.
-pub fn make_unique_folder<F: Folder>(folder: &F, prefix: &str, mode: u32) -> io::Result<(OsString, F)> {
-    let (name, ()) = make_unique(prefix, |name| folder.make_folder(name, mode))?;
-    let made = folder.open_folder(&name)?;
-    Ok((name, made))
-}
-
-/// Gives a file in `folder` this content at once: it is complete, on disk, or as it was. It is written on the `desk`, a
-/// folder on the same file system.
-///
-/// # Errors
-/// Those of the system.
-pub fn replace_file<F: Folder>(desk: &F, folder: &F, name: impl AsRef<OsStr>, content: &[u8]) -> io::Result<()> {
-    replace_with(desk, folder, name, |file| file.append(content).and_then(|()| file.sync()))?;
-    folder.sync()
-}
-
-/// As [`replace_file`], of a file that `write` writes to: nothing waits for the disk, unless that does.
-///
-/// # Errors
-/// Those of the system, and of `write`.
-pub fn replace_with<F: Folder>(
-    desk: &F,
-    folder: &F,
-    name: impl AsRef<OsStr>,
-    write: impl Fn(&F::File) -> io::Result<()>,
-) -> io::Result<()> {
-    let (fresh, file) = make_unique(FRESH, |fresh| desk.make_file(fresh, OPEN_FILE))?;
-    let placed = write(&file).and_then(|()| desk.rename(&fresh, folder, name, Rename::Over));
-    if placed.is_err() {
-        let _ = desk.unlink(&fresh);
-    }
-    placed
-}
-
-/// Moves a file or link to another folder, where its name must be free.
-///
-/// # Errors
-/// Those of the system.
-pub fn rename_to_free<F: Folder>(from: &F, name: &OsStr, to: &F, to_name: &OsStr) -> io::Result<()> {
-    match from.rename(name, to, to_name, Rename::ToFree) {
-        Err(error) if is_unsupported(&error) => {}
-        ended => return ended,
-    }
-    from.link(name, to, to_name)?;
-    from.unlink(name)
 }
 
 /// Whether a file system tells that it cannot do this at all.

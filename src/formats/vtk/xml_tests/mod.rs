@@ -147,7 +147,7 @@ fn files_that_hold_no_surface_are_refused_with_a_remedy() {
     for (kind, remedy) in cases {
         let file = format!("<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" version=\"0.1\"><{kind}/></VTKFile>");
         let reason = read_alone(Format::Vtu, file.as_bytes()).expect_err("refused").reason();
-        assert_eq!((reason.code, reason.place.as_deref()), (Code::UnsupportedFormat, Some("line 2")));
+        assert_eq!((reason.code, reason.location.as_deref()), (Code::UnsupportedFormat, Some("line 2")));
         assert!(reason.message.contains(kind) && reason.message.contains(remedy), "{reason:?}");
     }
 }

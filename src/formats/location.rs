@@ -2,14 +2,14 @@
 
 /// Where in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum Location {
     /// A line of text, from 1.
     Line(usize),
     /// A byte, from 0.
     Byte(usize),
 }
 
-impl Place {
+impl Location {
     /// The line of the byte at `at`.
     pub(super) fn line_of(bytes: &[u8], at: usize) -> Self {
         let before = &bytes[..at.min(bytes.len())];
@@ -17,7 +17,7 @@ impl Place {
     }
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for Location {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
