@@ -24,20 +24,20 @@ const LOWER: f64 = 0.625;
 const SIDE: usize = 12;
 
 /// The least length of connected features, as a share of the size of the surface (the square root of its area).
-const LEAST_LENGTH: f64 = 0.06;
+const MIN_LENGTH: f64 = 0.06;
 
 /// The least outline of a patch between features, likewise, weighed by the sharpness of the features: 1 minus the cosine
 /// of the dihedral angle, at most 1. A bolt hole is a patch, a dent in a scan that is as small is none.
-const LEAST_OUTLINE: f64 = 0.12;
+const MIN_OUTLINE: f64 = 0.12;
 
 /// What is between features and has a weighed outline below this is no face of its own.
-pub(super) fn least_outline(dual: &Dual) -> f64 {
-    LEAST_OUTLINE * dual.total_area().sqrt()
+pub(super) fn min_outline(dual: &Dual) -> f64 {
+    MIN_OUTLINE * dual.total_area().sqrt()
 }
 
 /// A patch that is narrower than this, likewise, is a bevel, and no face, if the features around it are blunt on average:
 /// what follows would have to resolve it.
-const LEAST_WIDTH: f64 = 0.005;
+const MIN_WIDTH: f64 = 0.005;
 
 /// Below this sharpness features are blunt: 60 degrees.
 const BLUNT: f64 = 0.5;
@@ -62,7 +62,7 @@ fn mark_features(dual: &mut Dual, angle: f64) -> Result<usize, Interrupted> {
     let cos = |degrees: f64| degrees.to_radians().cos();
     let (sharp, blunt) = (cos(angle), cos(LOWER * angle));
     let normals: Vec<Vec3> = (0..dual.mesh.triangles().len()).map(|f| dual.area_vector(f)).collect();
-    let pairs = dual.half_edges().filter_map(|h| Some((h, dual.across(h)?))).filter(|(h, t)| h < t);
+    let pairs = dual.half_edges().filter_map(|h| Some((h, dual.twin(h)?))).filter(|(h, t)| h < t);
     let bent = |(h, t): &(HalfEdgeId, HalfEdgeId)| is_bent(normals[h.face().index()], normals[t.face().index()], blunt);
     let candidates: Vec<_> = pairs.filter(bent).collect();
     let mut candidate = vec![false; dual.mesh.edges().len()];
@@ -99,19 +99,19 @@ fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId]) -> bool {
     let (patch_of, count) = patches(dual);
     let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
     let small = small_patches(dual, &patch_of, count);
-    let both = features.iter().flat_map(|h| [Some(*h), dual.across(*h)]).flatten();
-    let pairs = both.filter_map(|h| Some((patch(h), patch(dual.across(h)?), dual.length(h))));
+    let both = features.iter().flat_map(|h| [Some(*h), dual.twin(*h)]).flatten();
+    let pairs = both.filter_map(|h| Some((patch(h), patch(dual.twin(h)?), dual.length(h))));
     let mut between: Vec<_> = pairs.filter(|(a, b, _)| a != b && small[*a]).collect();
     between.sort_unstable_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)).then(x.2.total_cmp(&y.2)));
     let mut united = UnionFind::new(count);
     for of_patch in between.chunk_by(|x, y| x.0 == y.0) {
         let shared = of_patch.chunk_by(|x, y| x.1 == y.1).map(|c| (c.iter().map(|b| b.2).sum::<f64>(), c[0].1));
         if let Some((_, neighbour)) = shared.max_by(|x, y| x.0.total_cmp(&y.0).then(y.1.cmp(&x.1))) {
-            united.unite(of_patch[0].0, neighbour);
+            united.merge(of_patch[0].0, neighbour);
         }
     }
     for h in features {
-        let Some(t) = dual.across(*h).filter(|t| patch(*t) != patch(*h)) else { continue };
+        let Some(t) = dual.twin(*h).filter(|t| patch(*t) != patch(*h)) else { continue };
         if united.find(patch(t)) == united.find(patch(*h)) {
             let edge = dual.mesh.edges().edge(*h).index();
             dual.sharpness[edge] = 0.0;
@@ -133,7 +133,7 @@ fn small_patches(dual: &Dual, patch_of: &[u32], count: usize) -> Vec<bool> {
         outlines[patch] += dual.length(h);
         weighed[patch] += sharpness * dual.length(h);
     }
-    let (least, width) = (least_outline(dual), LEAST_WIDTH * dual.total_area().sqrt());
+    let (least, width) = (min_outline(dual), MIN_WIDTH * dual.total_area().sqrt());
     let is_bevel = |p: usize| 2.0 * areas[p] < width * outlines[p] && weighed[p] < BLUNT * outlines[p];
     (0..count).map(|p| weighed[p] < least || is_bevel(p)).collect()
 }
@@ -142,7 +142,7 @@ fn small_patches(dual: &Dual, patch_of: &[u32], count: usize) -> Vec<bool> {
 fn drop_dangling(dual: &mut Dual, features: &[HalfEdgeId]) {
     let (patch_of, _) = patches(dual);
     for h in features {
-        if dual.across(*h).is_some_and(|t| patch_of[t.face().index()] == patch_of[h.face().index()]) {
+        if dual.twin(*h).is_some_and(|t| patch_of[t.face().index()] == patch_of[h.face().index()]) {
             dual.sharpness[dual.mesh.edges().edge(*h).index()] = 0.0;
         }
     }
@@ -167,7 +167,7 @@ fn position_error(dual: &Dual) -> f64 {
 /// area vector is half the sum of p x dp around their outline: it changes by at most half the error times the outline.
 fn doubt(dual: &Dual, faces: &[FaceId], area_vector: Vec3, error: f64) -> f64 {
     let sides = faces.iter().flat_map(|f| [0, 1, 2].map(|k| HalfEdgeId::side_of(*f, k)));
-    let is_outer = |h: &HalfEdgeId| dual.across(*h).is_none_or(|t| !faces.contains(&t.face()));
+    let is_outer = |h: &HalfEdgeId| dual.twin(*h).is_none_or(|t| !faces.contains(&t.face()));
     let outline: f64 = sides.filter(is_outer).map(|h| dual.length(h)).sum();
     (0.5 * error * outline / norm(area_vector)).min(1.0).asin()
 }
@@ -180,7 +180,7 @@ fn side(dual: &Dual, candidate: &[bool], h: HalfEdgeId) -> Vec<FaceId> {
         let face = faces[next];
         next += 1;
         for e in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
-            let Some(t) = dual.across(e).filter(|_| !candidate[dual.mesh.edges().edge(e).index()]) else { continue };
+            let Some(t) = dual.twin(e).filter(|_| !candidate[dual.mesh.edges().edge(e).index()]) else { continue };
             if !faces.contains(&t.face()) {
                 faces.push(t.face());
             }
@@ -198,12 +198,12 @@ fn sum_of(normals: &[Vec3], faces: &[FaceId]) -> Vec3 {
 fn long_enough(dual: &Dual, edges: Vec<(HalfEdgeId, f64)>, strong: f64) -> Vec<(HalfEdgeId, f64)> {
     let mut sets = UnionFind::new(dual.mesh.points().len());
     edges.iter().for_each(|(h, _)| {
-        sets.unite(dual.from(*h), dual.to(*h));
+        sets.merge(dual.from(*h), dual.to(*h));
     });
     let mut lengths = vec![0.0; dual.mesh.points().len()];
     for (h, _) in edges.iter().filter(|e| e.1 > strong) {
         lengths[sets.find(dual.from(*h))] += dual.length(*h);
     }
-    let least = LEAST_LENGTH * dual.total_area().sqrt();
+    let least = MIN_LENGTH * dual.total_area().sqrt();
     edges.into_iter().filter(|(h, _)| lengths[sets.find(dual.from(*h))] >= least).collect()
 }

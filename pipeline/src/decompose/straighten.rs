@@ -6,8 +6,8 @@
 //! falls with every change, and the number of rounds is fixed.
 
 use super::dual::Dual;
-use super::lay::Path;
 use super::network::Network;
+use super::reroute::Path;
 use super::shortest::{Bounds, Goal, Tree, length, reversed, weight};
 use crate::monitor::Interrupted;
 use crate::topology::HalfEdgeId;
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 /// Rounds over all seams and corners, and the share of the length that makes another one worth while.
 const ROUNDS: usize = 2;
-const LEAST_GAIN: f64 = 5e-3;
+const MIN_GAIN: f64 = 5e-3;
 
 /// Pieces of fewer edges are not looked at.
 const FEW: usize = 4;
@@ -73,7 +73,7 @@ pub(super) fn straighten(
         work.seams()?;
         work.corners()?;
         let after = work.total();
-        if after >= (1.0 - LEAST_GAIN) * before {
+        if after >= (1.0 - MIN_GAIN) * before {
             break;
         }
         before = after;
@@ -189,12 +189,12 @@ impl<'n, 'a> Straightening<'n, 'a> {
         let (Some(first), Some(last)) = (path.first().copied(), path.last().copied()) else {
             return Ok(Shortened::Straight);
         };
-        let Some(beyond) = self.dual.across(first) else { return Ok(Shortened::Straight) };
+        let Some(beyond) = self.dual.twin(first) else { return Ok(Shortened::Straight) };
         let (left, right) = (self.network.label(first), self.network.label(beyond));
         let (from, to) = (self.dual.from(first), self.dual.to(last));
         let labels = [left, right];
         let before = length(self.dual, path);
-        self.network.lift(path);
+        self.network.remove_seam(path);
         let bounds = Bounds {
             goal: Goal::Vertex(to),
             labels: &labels,
@@ -204,10 +204,10 @@ impl<'n, 'a> Straightening<'n, 'a> {
         };
         self.trees[0].grow(self.network, from, &bounds)?;
         let Some(half_edges) = self.trees[0].path(self.dual, to) else {
-            self.network.put_back(path);
+            self.network.restore_seam(path);
             return Ok(Shortened::Straight);
         };
-        let laid = self.network.lay(path, &[Path { half_edges: half_edges.clone(), left, right }], &labels);
+        let laid = self.network.reroute(path, &[Path { half_edges: half_edges.clone(), left, right }], &labels);
         Ok(if laid { Shortened::To(half_edges) } else { Shortened::Illegal })
     }
 
@@ -265,16 +265,16 @@ impl<'n, 'a> Straightening<'n, 'a> {
         let before: f64 = arms.iter().map(|a| length(self.dual, a)).sum();
         let sides: Vec<_> = starts
             .iter()
-            .filter_map(|h| Some((self.network.label(*h), self.network.label(self.dual.across(*h)?))))
+            .filter_map(|h| Some((self.network.label(*h), self.network.label(self.dual.twin(*h)?))))
             .collect();
-        arms.iter().for_each(|a| self.network.lift(a));
+        arms.iter().for_each(|a| self.network.remove_seam(a));
         let Some(ways) = self.meeting(&ends, &labels, before)? else {
-            arms.iter().for_each(|a| self.network.put_back(a));
+            arms.iter().for_each(|a| self.network.restore_seam(a));
             return Ok(false);
         };
         let path = |(half_edges, (left, right))| Path { half_edges, left, right };
         let paths: Vec<Path> = ways.into_iter().zip(sides).map(path).collect();
-        Ok(self.network.lay(&arms.concat(), &paths, &labels))
+        Ok(self.network.reroute(&arms.concat(), &paths, &labels))
     }
 
     /// The ways from the vertex where the sum of the distances to three `ends` is least, if it is less than `before`.
@@ -308,11 +308,11 @@ impl<'n, 'a> Straightening<'n, 'a> {
     fn slide(&mut self, end: usize, arm: &[HalfEdgeId]) -> Result<bool, Interrupted> {
         let start = arm[0];
         let root = self.dual.to(arm[arm.len() - 1]);
-        let Some(beyond) = self.dual.across(start) else { return Ok(false) };
+        let Some(beyond) = self.dual.twin(start) else { return Ok(false) };
         let (left, right) = (self.network.label(start), self.network.label(beyond));
         let labels = [left, right];
         let before = length(self.dual, arm);
-        self.network.lift(arm);
+        self.network.remove_seam(arm);
         let bounds = Bounds {
             goal: Goal::OpenLoop(end),
             labels: &labels,
@@ -324,11 +324,11 @@ impl<'n, 'a> Straightening<'n, 'a> {
         tree.grow(self.network, root, &bounds)?;
         let open = tree.settled.last().copied().filter(|v| *v != root && self.network.on_one_loop(*v, end));
         let Some(path) = open.and_then(|vertex| tree.path(self.dual, vertex)) else {
-            self.network.put_back(arm);
+            self.network.restore_seam(arm);
             return Ok(false);
         };
         let half_edges = reversed(self.dual, &path);
-        Ok(self.network.lay(arm, &[Path { half_edges, left, right }], &labels))
+        Ok(self.network.reroute(arm, &[Path { half_edges, left, right }], &labels))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::Metric;
 use crate::atlas::Chart;
 use crate::topology::VertexId;
-use crate::topology::{Census, EdgeTable};
+use crate::topology::{EdgeTable, TopologySummary};
 use crate::vec3::{BoundingBox, Vec3, triangle_area};
 
 /// A triangulated surface after repair: no triangle repeats a vertex or another triangle, orientable components
@@ -18,7 +18,7 @@ pub struct SurfaceMesh {
     /// Vertices from this one on are not of the input.
     pub(super) added_from: usize,
     pub(super) edges: EdgeTable,
-    pub(super) census: Census,
+    pub(super) summary: TopologySummary,
     pub(super) metric: Metric,
 }
 
@@ -45,12 +45,12 @@ pub(crate) struct Sheets {
 
 impl SurfaceMesh {
     /// A surface of these parts, counted, unless its triangles are `counted` already.
-    pub(crate) fn new(parts: SurfaceParts, sheets: Sheets, counted: Option<Census>) -> Self {
+    pub(crate) fn new(parts: SurfaceParts, sheets: Sheets, counted: Option<TopologySummary>) -> Self {
         let SurfaceParts { points, triangles, source, welded, added_from, edges, metric } = parts;
-        let counted = counted.unwrap_or_else(|| Census::new(&triangles, &edges));
+        let counted = counted.unwrap_or_else(|| TopologySummary::new(&triangles, &edges));
         let Sheets { nonmanifold_edges, nonmanifold_vertices } = sheets;
-        let census = Census { nonmanifold_edges, nonmanifold_vertices, ..counted };
-        Self { points, triangles, source, welded, added_from, edges, census, metric }
+        let summary = TopologySummary { nonmanifold_edges, nonmanifold_vertices, ..counted };
+        Self { points, triangles, source, welded, added_from, edges, summary, metric }
     }
 
     /// Checks what the surface knows of itself against what its triangles tell.
@@ -58,12 +58,16 @@ impl SurfaceMesh {
     pub(crate) fn assert_sound(&self) {
         let edges = EdgeTable::new(&self.triangles);
         assert!(self.edges.iter().eq(edges.iter()), "edges");
-        let Census { nonmanifold_edges, nonmanifold_vertices, .. } = self.census;
-        let anew = Census { nonmanifold_edges, nonmanifold_vertices, ..Census::new(&self.triangles, &edges) };
-        assert_eq!(self.census, anew);
+        let TopologySummary { nonmanifold_edges, nonmanifold_vertices, .. } = self.summary;
+        let anew = TopologySummary {
+            nonmanifold_edges,
+            nonmanifold_vertices,
+            ..TopologySummary::new(&self.triangles, &edges)
+        };
+        assert_eq!(self.summary, anew);
         let faces = self.triangles.len();
         assert_eq!((self.source.len(), self.metric.shapes.len(), self.metric.flagged.len()), (faces, faces, faces));
-        assert_eq!((self.welded.len(), self.census.vertices), (self.points.len(), self.points.len()));
+        assert_eq!((self.welded.len(), self.summary.vertices), (self.points.len(), self.points.len()));
     }
 
     /// The positions of the vertices, in the unit of the input.
@@ -99,8 +103,8 @@ impl SurfaceMesh {
 
     /// The counts after splitting; but `nonmanifold_edges` are those that were split, and `nonmanifold_vertices`
     /// those at which a sheet touches others away from its boundary.
-    pub fn census(&self) -> &Census {
-        &self.census
+    pub fn topology_summary(&self) -> &TopologySummary {
+        &self.summary
     }
 
     /// The intrinsic metric.
@@ -123,7 +127,7 @@ impl SurfaceMesh {
             welded: chart.vertices().iter().map(|v| self.welded[vertex(v)]).collect(),
             source: chart.faces().iter().map(|f| self.source[f.index()]).collect(),
             added_from: chart.vertices().partition_point(|v| v.index() < self.added_from),
-            census: Census::new(&triangles, &edges),
+            summary: TopologySummary::new(&triangles, &edges),
             metric: Metric {
                 shapes: chart.shapes().to_vec(),
                 flagged: chart.flagged().to_vec(),
