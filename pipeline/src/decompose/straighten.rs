@@ -41,7 +41,16 @@ struct Straightening<'n, 'a> {
     share: f64,
     /// The seams, and the corners with their seams, that were tried in vain: they are not tried again before they
     /// have changed.
-    vain: BTreeSet<(Option<usize>, Vec<HalfEdgeId>)>,
+    vain: BTreeSet<Tried>,
+}
+
+/// What was to be shortened.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Tried {
+    /// A seam.
+    Seam(Vec<HalfEdgeId>),
+    /// A corner, with its seams as far as they are laid anew with it.
+    Corner(usize, Vec<HalfEdgeId>),
 }
 
 /// What became of a seam that was to be replaced by the shortest path.
@@ -82,8 +91,8 @@ pub(super) fn straighten(
 }
 
 /// Pulls straight the seams of charts that are `wanted`, and parts of them, that are more than `bent` times as long as
-/// they must be, as far as the others let it, and whatever becomes of the charts, as long as they are legal. Corners stay where they are, and
-/// closed seams are held at [`PINS`] of their vertices. Whether anything changed.
+/// they must be, as far as the others let it, and whatever becomes of the charts, as long as they are legal. Corners stay
+/// where they are, and closed seams are held at [`PINS`] of their vertices. Whether anything changed.
 ///
 /// # Errors
 /// As [`straighten`].
@@ -147,11 +156,10 @@ impl<'n, 'a> Straightening<'n, 'a> {
     fn seams(&mut self) -> Result<(), Interrupted> {
         for path in self.network.curves() {
             let closed = self.dual.is_closed(&path);
-            let tried = (None, path);
+            let tried = Tried::Seam(path.clone());
             if self.vain.contains(&tried) {
                 continue;
             }
-            let path = tried.1.clone();
             let shorter = if closed { self.shorten_loop(path, 3, 12)? } else { self.shorten_all(path)? };
             if !shorter {
                 self.vain.insert(tried);
@@ -237,7 +245,7 @@ impl<'n, 'a> Straightening<'n, 'a> {
                 _ => continue,
             };
             let arms: Vec<_> = seams.iter().map(|h| self.network.follow(*h, self.reach)).collect();
-            let tried = (Some(vertex), arms.concat());
+            let tried = Tried::Corner(vertex, arms.concat());
             if self.vain.contains(&tried) {
                 continue;
             }

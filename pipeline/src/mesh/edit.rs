@@ -40,9 +40,9 @@ impl MeshEditor {
     /// If a triangle was split before, as its half-edges are not those of the surface any more; if the half-edges do not run
     /// along one edge in opposite directions.
     pub(crate) fn split_edge(&mut self, sides: [HalfEdgeId; 2]) -> Option<[FaceId; 2]> {
+        assert!(sides.iter().all(|h| !self.is_split[h.face().index()]), "a triangle is split twice");
         let ends = sides.map(|h| [self.from(h), self.from(h.next())]);
         assert!(ends[0][0] == ends[1][1] && ends[0][1] == ends[1][0], "{sides:?} are the sides of no edge");
-        assert!(sides.iter().all(|h| !self.is_split[h.face().index()]), "a triangle is split twice");
         let middle = VertexId::at(self.mesh.points.len());
         let parts = sides.map(|side| self.halves(side, middle));
         if parts.iter().flatten().any(|(_, shape)| shape.area() == 0.0) {
