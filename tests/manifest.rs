@@ -5,7 +5,7 @@ use crate::corpus::{manifest, shared};
 use planish::formats::{Format, Kind, kind};
 use planish::input::{Folder, decode};
 use planish::settings::{RawSettings, Settings};
-use planish_core::topology::Census;
+use planish_core::topology::TopologySummary;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn found(path: &Path, settings: &Settings) -> Option<Vec<(&'static str, String)>
     let left_out = if kind(path) == Kind::Mesh(Format::Msh) { content.notes.mid_nodes } else { 0 };
     let [points, triangles] = [content.soup.points().len() + left_out, content.soup.triangles().len()];
     let repaired = planish_core::repair(&content.soup, &planish_core::repair::Settings { weld: 0.0 }).ok()?;
-    let raw: Census = repaired.raw;
+    let raw: TopologySummary = repaired.raw;
     let found = [
         ("vertices_file", points as i64),
         ("triangles_file", triangles as i64),

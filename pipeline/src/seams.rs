@@ -215,9 +215,9 @@ impl Boundary {
         let mut loops = Vec::new();
         for chart in charts {
             let all = std::iter::once(chart.outer()).chain(chart.holes().iter().map(Vec::as_slice));
-            let add = |turn: &[HalfEdgeId]| {
+            let add = |boundary_loop: &[HalfEdgeId]| {
                 let first = steps.len();
-                steps.extend(turn.iter().map(|h| step(mesh, chart, *h)));
+                steps.extend(boundary_loop.iter().map(|h| step(mesh, chart, *h)));
                 first..steps.len()
             };
             loops.push(all.map(add).collect());
@@ -301,8 +301,8 @@ impl<'a> Tracer<'a> {
     fn trace(mut self) -> SeamNetwork {
         let boundary = self.boundary;
         for (chart, loops) in boundary.loops.iter().enumerate() {
-            for turn in loops {
-                let passages = self.runs(turn.clone()).iter().map(|run| self.pass(run)).collect();
+            for boundary_loop in loops {
+                let passages = self.runs(boundary_loop.clone()).iter().map(|run| self.pass(run)).collect();
                 self.network.loops[chart].push(passages);
             }
         }
@@ -310,8 +310,8 @@ impl<'a> Tracer<'a> {
     }
 
     /// A loop cut at its corners; whole where it has none.
-    fn runs(&self, turn: std::ops::Range<usize>) -> Vec<Vec<usize>> {
-        let steps: Vec<usize> = turn.collect();
+    fn runs(&self, boundary_loop: std::ops::Range<usize>) -> Vec<Vec<usize>> {
+        let steps: Vec<usize> = boundary_loop.collect();
         cut_at_corners(&steps, |s| self.corner[self.boundary.steps[*s].from as usize])
     }
 

@@ -301,7 +301,7 @@ mod tests {
     fn shapes_have_the_topology_of_their_names() {
         let check = |soup: TriangleSoup, components, loops, genus, orientable| {
             let got = repair(&soup, &Settings::default()).expect("a surface is left");
-            let c = got.mesh.census();
+            let c = got.mesh.topology_summary();
             assert_eq!((c.components, c.boundary_loops, c.genus, c.orientable), (components, loops, genus, orientable));
         };
         check(disk(4), 1, 1, Some(0), true);

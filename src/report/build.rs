@@ -9,7 +9,7 @@ use planish_core::certify::{CertifiedMap, PlanarMap};
 use planish_core::map::linear;
 use planish_core::repair::{self, Repaired};
 use planish_core::seams::{Curve, SeamNetwork};
-use planish_core::topology::Census;
+use planish_core::topology::TopologySummary;
 use planish_core::untangle;
 use planish_core::{CertifiedAtlas, CertifiedChart};
 
@@ -19,14 +19,14 @@ pub fn surface(repaired: &Repaired) -> Surface {
     Surface {
         raw: counts(&repaired.raw),
         repaired: RepairedSurface {
-            counts: counts(repaired.mesh.census()),
+            counts: counts(repaired.mesh.topology_summary()),
             area: repaired.mesh.area(),
             bbox: [bbox.min, bbox.max],
         },
     }
 }
 
-fn counts(c: &Census) -> Counts {
+fn counts(c: &TopologySummary) -> Counts {
     Counts {
         vertices: c.vertices,
         triangles: c.triangles,

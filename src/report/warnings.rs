@@ -1,7 +1,7 @@
 //! What a surface may suffer from although it is certified: told to people, and in report.json.
 
 use planish_core::mesh::{CoordinateSteps, FEW_STEPS, ValueApart};
-use planish_core::repair::{Found, Repaired};
+use planish_core::repair::{Repaired, Sample};
 use serde::{Deserialize, Serialize};
 
 /// A share of the triangles above this is nearly all.
@@ -56,7 +56,7 @@ fn axis(k: usize) -> char {
     ['x', 'y', 'z'][k % 3]
 }
 
-fn t_junctions(left: &Found) -> String {
+fn t_junctions(left: &Sample) -> String {
     format!(
         "{} boundary vertices (after welding: {}) lie on boundary edges and stay open: sides that face each other (walls of \
          a thin gap), or that only touch there; if the surface should be closed there, unite the solids before the export, \
@@ -67,7 +67,7 @@ fn t_junctions(left: &Found) -> String {
 }
 
 /// The first ids of what was found.
-fn listed(found: &Found) -> String {
+fn listed(found: &Sample) -> String {
     let ids: Vec<String> = found.first.iter().map(ToString::to_string).collect();
     ids.join(", ") + if found.count > found.first.len() { ", ..." } else { "" }
 }

@@ -126,9 +126,10 @@ fn all_sides(cells: &[[u32; 6]], nodes: usize) -> Vec<Side> {
 }
 
 /// Strings the boundary arcs together, from the least node of each loop on. Each vertex has at most one arc out; the
-/// boundary of oriented triangles also has as many in, so every walk returns to its start. (The walk itself is the one that
-/// makers of charts use; what it walks over is found here from the cells alone, and a walk that did not close would be an
-/// error.)
+/// boundary of oriented triangles also has as many in, so every walk returns to its start.
+///
+/// (The walk itself is the one that makers of charts use; what it walks over is found here, from the cells alone, and a
+/// walk that did not close would be an error.)
 fn loops_of(mut out: Vec<Option<[u32; 2]>>) -> Result<Vec<Vec<ArcNodes>>, IncidenceError> {
     let nodes = 0..out.len() as u32;
     let loops = closed_loops(nodes, |from| {

@@ -27,8 +27,8 @@ pub(super) struct HalfArc {
     pub next: u32,
     /// The other side, or [`NONE`] where the surface ends.
     pub twin: u32,
-    /// The cells that lie beyond without being joined (see [`Dual::foes`]), ascending.
-    pub foes: Vec<u32>,
+    /// The cells that lie beyond without being joined (see [`Dual::coincident_faces`]), ascending.
+    pub coincident_cells: Vec<u32>,
     pub length: f64,
     /// The length that is a feature, and that weighed by its sharpness.
     pub feature: f64,
@@ -64,7 +64,7 @@ impl Complex {
     pub(super) fn new(dual: &Dual, cells: &Cells) -> Self {
         let tracer = Tracer::new(dual, cells);
         let arcs = tracer.arcs();
-        let mut made = Self { cells: vec![Cell::default(); cells.count], arcs, corners: 0 };
+        let mut made = Self { cells: vec![Cell::default(); cells.len], arcs, corners: 0 };
         made.measure(dual, cells, &tracer);
         made.number_corners(dual);
         made
@@ -73,15 +73,15 @@ impl Complex {
     /// Sums up triangles. With I inner vertices, B boundary half-edges and F triangles the Euler number of an opened
     /// cell is I + (B - F)/2.
     fn measure(&mut self, dual: &Dual, cells: &Cells, tracer: &Tracer) {
-        let mut doubled = vec![0_i64; cells.count];
+        let mut doubled = vec![0_i64; cells.len];
         let mut counted = vec![false; dual.mesh.points().len()];
         tracer.boundary.iter().for_each(|h| counted[dual.from(*h)] = true);
         tracer.boundary.iter().for_each(|h| doubled[tracer.cells.label(*h) as usize] += 1);
         for (f, t) in dual.mesh.triangles().iter().enumerate() {
             let (area, normal, centroid) = (dual.area(f), dual.area_vector(f), dual.centroid(f));
             let fresh = t.iter().filter(|v| !std::mem::replace(&mut counted[v.index()], true)).count();
-            doubled[cells.of[f] as usize] += 2 * fresh as i64 - 1;
-            let cell = &mut self.cells[cells.of[f] as usize];
+            doubled[cells.labels[f] as usize] += 2 * fresh as i64 - 1;
+            let cell = &mut self.cells[cells.labels[f] as usize];
             cell.faces += 1;
             cell.area += area;
             (0..3).for_each(|k| cell.normal[k] += normal[k]);
@@ -122,7 +122,7 @@ struct Tracer<'a> {
 
 impl<'a> Tracer<'a> {
     fn new(dual: &'a Dual<'a>, cells: &'a Cells) -> Self {
-        let of = &cells.of[..];
+        let of = &cells.labels[..];
         let cells = Partition::new(dual, of);
         let boundary = cells.boundary();
         let loops = cells.loops(&boundary);
@@ -131,8 +131,8 @@ impl<'a> Tracer<'a> {
         made
     }
 
-    fn foes(&self, h: HalfEdgeId) -> Vec<u32> {
-        let mut cells: Vec<u32> = self.dual.foes(h).iter().map(|f| self.of[f.index()]).collect();
+    fn coincident_cells(&self, h: HalfEdgeId) -> Vec<u32> {
+        let mut cells: Vec<u32> = self.dual.coincident_faces(h).iter().map(|f| self.of[f.index()]).collect();
         cells.sort_unstable();
         cells.dedup();
         cells
@@ -143,19 +143,19 @@ impl<'a> Tracer<'a> {
         let (mut out, mut open) = (vec![0_u32; vertices], vec![false; vertices]);
         for h in &self.boundary {
             out[self.dual.from(*h)] += 1;
-            if self.dual.across(*h).is_none() {
+            if self.dual.twin(*h).is_none() {
                 (open[self.dual.from(*h)], open[self.dual.to(*h)]) = (true, true);
             }
         }
-        // Counted by half-edges, not by edges as in [`super::network`]: where triangles disagree about the orientation, an edge
-        // is an end of the surface to both, and its half-edges begin at the same vertex.
+        // Counted by half-edges, not by edges as in [`super::network`]: where triangles disagree about the orientation,
+        // an edge is an end of the surface to both, and its half-edges begin at the same vertex.
         for v in (0..vertices).filter(|v| out[*v] > 0) {
             self.corner[v] = out[v] != if open[v] { 1 } else { 2 };
         }
         for boundary_loop in &self.loops {
             let follower = boundary_loop.iter().cycle().skip(1);
             for (h, next) in boundary_loop.iter().zip(follower) {
-                if self.dual.across(*h).is_none() && self.foes(*h) != self.foes(*next) {
+                if self.dual.twin(*h).is_none() && self.coincident_cells(*h) != self.coincident_cells(*next) {
                     self.corner[self.dual.from(*next)] = true;
                 }
             }
@@ -178,7 +178,7 @@ impl<'a> Tracer<'a> {
         let mut arcs: Vec<HalfArc> = runs.iter().map(|run| self.arc(run)).collect();
         for arc in &mut arcs {
             arc.next = number[self.cells.next(arc.last).index()];
-            arc.twin = self.dual.across(arc.last).map_or(NONE, |t| number[t.index()]);
+            arc.twin = self.dual.twin(arc.last).map_or(NONE, |t| number[t.index()]);
         }
         arcs
     }
@@ -192,7 +192,7 @@ impl<'a> Tracer<'a> {
             from: self.dual.from(first) as u32,
             next: NONE,
             twin: NONE,
-            foes: self.foes(first),
+            coincident_cells: self.coincident_cells(first),
             length: run.iter().map(length).sum(),
             feature: run.iter().filter(|h| self.dual.is_feature(**h)).map(length).sum(),
             sharp: run.iter().map(|h| length(h) * self.dual.sharpness(*h)).sum(),
@@ -213,8 +213,8 @@ mod tests {
     use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
     use crate::shapes::{self, Random};
-    use crate::topology::{Census, EdgeTable, Umbrellas};
     use crate::topology::{ChartId, FaceId, VertexId};
+    use crate::topology::{EdgeTable, TopologySummary, VertexFans};
 
     fn surface(soup: &TriangleSoup) -> SurfaceMesh {
         repair(soup, &Settings::default()).expect("a surface is left").mesh
@@ -224,8 +224,8 @@ mod tests {
     fn compare(dual: &Dual, cells: &Cells, regions: &mut Regions, region: u32) {
         let (outline, known) = (regions.outline_of(region), regions.all[region as usize].clone());
         let shape = regions.shape(&known, &outline);
-        let own = |f: &usize| known.cells.contains(&cells.of[*f]);
-        let faces: Vec<FaceId> = (0..cells.of.len()).filter(own).map(FaceId::at).collect();
+        let own = |f: &usize| known.cells.contains(&cells.labels[*f]);
+        let faces: Vec<FaceId> = (0..cells.labels.len()).filter(own).map(FaceId::at).collect();
         let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| dual.mesh.triangles()[f.index()]).collect();
         vertices.sort_unstable();
         vertices.dedup();
@@ -234,14 +234,14 @@ mod tests {
         let edges = EdgeTable::new(&triangles);
         let legal = legality::verify(ChartId(0), &triangles, &edges, vertices.len()).is_ok();
         assert_eq!((shape.faces, shape.is_chart()), (faces.len(), legal), "{shape:?}");
-        let census = Census::new(&triangles, &edges);
-        let at_rim = |h: &HalfEdgeId| dual.across(*h).is_none_or(|t| !own(&t.face().index()));
+        let summary = TopologySummary::new(&triangles, &edges);
+        let at_rim = |h: &HalfEdgeId| dual.twin(*h).is_none_or(|t| !own(&t.face().index()));
         let rim: f64 = dual.half_edges().filter(|h| own(&h.face().index()) && at_rim(h)).map(|h| dual.length(h)).sum();
         assert!((known.length - rim).abs() < 1e-9 * (1.0 + rim));
-        if census.orientable {
-            let opened = Umbrellas::new(&triangles, &edges).count;
+        if summary.orientable {
+            let opened = VertexFans::new(&triangles, &edges).count;
             let euler = opened as i64 - edges.len() as i64 + triangles.len() as i64;
-            assert_eq!((shape.euler, shape.loops), (euler, census.boundary_loops));
+            assert_eq!((shape.euler, shape.loops), (euler, summary.boundary_loops));
             assert_eq!(shape.pinches > 0, opened > vertices.len());
         }
     }
@@ -255,14 +255,14 @@ mod tests {
             let cells = compact_cells(&dual, |_| count, &dual.checkpoint).expect("nobody cancels");
             let complex = Complex::new(&dual, &cells);
             let mut random = Random(count as u64);
-            let mut regions = Regions::new(&complex, (0..cells.count as u32).collect(), cells.count);
-            (0..cells.count as u32).for_each(|r| compare(&dual, &cells, &mut regions, r));
+            let mut regions = Regions::new(&complex, (0..cells.len as u32).collect(), cells.len);
+            (0..cells.len as u32).for_each(|r| compare(&dual, &cells, &mut regions, r));
             // Every union leaves one region less.
             while let Some(a) = some_with_neighbours(&regions, &mut random) {
                 let beside: Vec<u32> = regions.neighbours(a).into_iter().filter(|b| *b != a).collect();
                 let b = beside[random.below(beside.len())];
                 let union = regions.union(a, b).expect("neighbours");
-                regions.unite(a, b, union);
+                regions.merge(a, b, union);
                 compare(&dual, &cells, &mut regions, a);
                 let anew = Regions::new(&complex, regions.of_cell.clone(), regions.all.len());
                 assert_eq!(regions.all[a as usize].euler, anew.all[a as usize].euler);

@@ -15,7 +15,7 @@ const NONE: HalfEdgeId = HalfEdgeId(u32::MAX);
 #[derive(Clone, Copy)]
 struct Side {
     /// The half-edge on the other side, or [`NONE`].
-    across: HalfEdgeId,
+    twin: HalfEdgeId,
     from: VertexId,
     /// The true length.
     length: f64,
@@ -34,7 +34,7 @@ pub(super) struct Dual<'a> {
     areas: Vec<f64>,
     /// The triangles that lie at the same place beyond an open half-edge: where triangles disagree about the
     /// orientation, and where repair took sheets apart. No chart has both.
-    foes: BTreeMap<HalfEdgeId, Vec<FaceId>>,
+    coincident_faces: BTreeMap<HalfEdgeId, Vec<FaceId>>,
     /// Per half-edge the distance of the centroids at its sides by way of its middle.
     steps: Vec<f64>,
 }
@@ -45,9 +45,9 @@ impl<'a> Dual<'a> {
         let points: Vec<Vec3> = mesh.points().iter().map(|p| p.map(|c| c * scale)).collect();
         let triangles = mesh.triangles();
         let from = |h: HalfEdgeId| triangles[h.face().index()][h.side()];
-        let across = |h: HalfEdgeId| mesh.edges().twin(h).filter(|t| from(*t) != from(h)).unwrap_or(NONE);
+        let twin = |h: HalfEdgeId| mesh.edges().twin(h).filter(|t| from(*t) != from(h)).unwrap_or(NONE);
         let length = |h: HalfEdgeId| distance(points[from(h).index()], points[from(h.next()).index()]);
-        let side = |h| Side { across: across(h), from: from(h), length: length(h) };
+        let side = |h| Side { twin: twin(h), from: from(h), length: length(h) };
         let centroid = |t: &[VertexId; 3]| {
             let [a, b, c] = t.map(|v| points[v.index()]);
             [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0)
@@ -58,12 +58,12 @@ impl<'a> Dual<'a> {
             centroids: triangles.iter().map(centroid).collect(),
             areas: mesh.metric().shapes.iter().map(|s| s.area()).collect(),
             steps: Vec::new(),
-            foes: BTreeMap::new(),
+            coincident_faces: BTreeMap::new(),
             mesh,
             checkpoint: Checkpoint::new(monitor),
             points,
         };
-        made.foes = made.find_foes();
+        made.coincident_faces = made.find_coincident_faces();
         made.steps = made.half_edges().map(|h| made.step(h)).collect();
         made
     }
@@ -73,12 +73,12 @@ impl<'a> Dual<'a> {
         self.checkpoint.after(self.areas.len())
     }
 
-    fn find_foes(&self) -> BTreeMap<HalfEdgeId, Vec<FaceId>> {
+    fn find_coincident_faces(&self) -> BTreeMap<HalfEdgeId, Vec<FaceId>> {
         let place = |h: HalfEdgeId| {
             let [a, b] = [self.from(h), self.to(h)].map(|v| self.mesh.welded_vertex(VertexId::at(v)));
             (a.min(b), a.max(b))
         };
-        let open = self.half_edges().filter(|h| self.across(*h).is_none());
+        let open = self.half_edges().filter(|h| self.twin(*h).is_none());
         let mut open: Vec<_> = open.map(|h| (place(h), h)).collect();
         open.sort_unstable();
         let at_one_place = open.chunk_by(|g, h| g.0 == h.0).filter(|all| all.len() > 1);
@@ -90,20 +90,20 @@ impl<'a> Dual<'a> {
     }
 
     /// The triangles that lie beyond `h` without being joined to it.
-    pub(super) fn foes(&self, h: HalfEdgeId) -> &[FaceId] {
-        self.foes.get(&h).map_or(&[], Vec::as_slice)
+    pub(super) fn coincident_faces(&self, h: HalfEdgeId) -> &[FaceId] {
+        self.coincident_faces.get(&h).map_or(&[], Vec::as_slice)
     }
 
     fn step(&self, h: HalfEdgeId) -> f64 {
         let m = self.middle(h);
         let reach = |f: FaceId| distance(self.centroids[f.index()], m);
-        reach(h.face()) + self.across(h).map_or(0.0, |t| reach(t.face()))
+        reach(h.face()) + self.twin(h).map_or(0.0, |t| reach(t.face()))
     }
 
     /// The half-edge on the other side, running the other way; none at the boundary, and where the triangles
     /// disagree about the orientation.
-    pub(super) fn across(&self, h: HalfEdgeId) -> Option<HalfEdgeId> {
-        Some(self.sides[h.index()].across).filter(|t| *t != NONE)
+    pub(super) fn twin(&self, h: HalfEdgeId) -> Option<HalfEdgeId> {
+        Some(self.sides[h.index()].twin).filter(|t| *t != NONE)
     }
 
     /// Whether the edge along `h` is a feature.
@@ -165,13 +165,13 @@ impl<'a> Dual<'a> {
         midpoint(self.points[self.from(h)], self.points[self.to(h)])
     }
 
-    /// The triangles, united with those neighbours with which they are `together`: told of the half-edge between them and its
-    /// other side.
+    /// The triangles, united with those neighbours with which they are `together`: told of the half-edge between them
+    /// and its other side.
     pub(super) fn united(&self, together: impl Fn(HalfEdgeId, HalfEdgeId) -> bool) -> UnionFind {
         let mut sets = UnionFind::new(self.centroids.len());
         for h in self.half_edges() {
-            if let Some(twin) = self.across(h).filter(|twin| together(h, *twin)) {
-                sets.unite(h.face().index(), twin.face().index());
+            if let Some(twin) = self.twin(h).filter(|twin| together(h, *twin)) {
+                sets.merge(h.face().index(), twin.face().index());
             }
         }
         sets
@@ -184,7 +184,7 @@ impl<'a> Dual<'a> {
 
 impl Twins for Dual<'_> {
     fn twin(&self, h: HalfEdgeId) -> Option<HalfEdgeId> {
-        self.across(h)
+        self.twin(h)
     }
 }
 
@@ -196,7 +196,7 @@ impl Graph for Dual<'_> {
     /// Neighbours across edges that are no features, at the distance of the centroids by way of the edge's middle.
     fn each_neighbour(&self, face: usize, mut visit: impl FnMut(usize, f64)) {
         for h in (0..3).map(|k| HalfEdgeId::side_of(FaceId::at(face), k)) {
-            let Some(other) = self.across(h).filter(|_| !self.is_feature(h)) else { continue };
+            let Some(other) = self.twin(h).filter(|_| !self.is_feature(h)) else { continue };
             visit(other.face().index(), self.steps[h.index()]);
         }
     }

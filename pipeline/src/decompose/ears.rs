@@ -83,8 +83,8 @@ impl Work {
 
     /// Splits ears that share no triangle; whether there was one.
     ///
-    /// Ears are looked for on the surface as it is being edited. A triangle beside one that was split just now may pass for an
-    /// ear there, as the sides of that one are numbered anew: then an edge more is split than need be.
+    /// Ears are looked for on the surface as it is being edited. A triangle beside one that was split just now may pass
+    /// for an ear there, as the sides of that one are numbered anew: then an edge more is split than need be.
     fn pass(&mut self, editor: &mut MeshEditor) -> bool {
         let mut busy = vec![false; self.labels.len()];
         let mut found = false;

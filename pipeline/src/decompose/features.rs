@@ -24,20 +24,20 @@ const LOWER: f64 = 0.625;
 const SIDE: usize = 12;
 
 /// The least length of connected features, as a share of the size of the surface (the square root of its area).
-const LEAST_LENGTH: f64 = 0.06;
+const MIN_LENGTH: f64 = 0.06;
 
 /// The least outline of a patch between features, likewise, weighed by the sharpness of the features: 1 minus the cosine
 /// of the dihedral angle, at most 1. A bolt hole is a patch, a dent in a scan that is as small is none.
-const LEAST_OUTLINE: f64 = 0.12;
+const MIN_OUTLINE: f64 = 0.12;
 
 /// What is between features and has a weighed outline below this is no face of its own.
-pub(super) fn least_outline(dual: &Dual) -> f64 {
-    LEAST_OUTLINE * dual.total_area().sqrt()
+pub(super) fn min_outline(dual: &Dual) -> f64 {
+    MIN_OUTLINE * dual.total_area().sqrt()
 }
 
 /// A patch that is narrower than this, likewise, is a bevel, and no face, if the features around it are blunt on average:
 /// what follows would have to resolve it.
-const LEAST_WIDTH: f64 = 0.005;
+const MIN_WIDTH: f64 = 0.005;
 
 /// Below this sharpness features are blunt: 60 degrees.
 const BLUNT: f64 = 0.5;
@@ -57,40 +57,67 @@ pub(super) fn with_features<'a>(
     Ok((dual, count))
 }
 
+/// An edge that may be a feature.
+struct Crease {
+    /// The lesser one of its half-edges.
+    edge: HalfEdgeId,
+    /// 1 minus the cosine of the dihedral angle, at most 1.
+    sharpness: f64,
+}
+
 /// Marks the feature edges of `dual`: dihedral angle above `angle` degrees. Returns their number.
 fn mark_features(dual: &mut Dual, angle: f64) -> Result<usize, Interrupted> {
     let cos = |degrees: f64| degrees.to_radians().cos();
     let (sharp, blunt) = (cos(angle), cos(LOWER * angle));
-    let normals: Vec<Vec3> = (0..dual.mesh.triangles().len()).map(|f| dual.area_vector(f)).collect();
-    let pairs = dual.half_edges().filter_map(|h| Some((h, dual.across(h)?))).filter(|(h, t)| h < t);
-    let bent = |(h, t): &(HalfEdgeId, HalfEdgeId)| is_bent(normals[h.face().index()], normals[t.face().index()], blunt);
-    let candidates: Vec<_> = pairs.filter(bent).collect();
-    let mut candidate = vec![false; dual.mesh.edges().len()];
-    candidates.iter().for_each(|(h, _)| candidate[dual.mesh.edges().edge(*h).index()] = true);
-    let error = position_error(dual);
-    let sharpness = |(h, t): &(HalfEdgeId, HalfEdgeId)| {
-        let sides = [h, t].map(|e| side(dual, &candidate, *e));
-        let [m, n] = [0, 1].map(|k| sum_of(&normals, &sides[k]));
-        let cos = dot(m, n) / (norm(m) * norm(n));
-        if error == 0.0 {
-            return 1.0 - cos;
-        }
-        let doubt = doubt(dual, &sides[0], m, error) + doubt(dual, &sides[1], n, error);
-        1.0 - (cos.clamp(-1.0, 1.0).acos() - doubt).max(0.0).cos()
-    };
-    let measured = candidates.iter().map(|c| (c.0, sharpness(c).min(1.0)));
-    let kept = long_enough(dual, measured.filter(|m| m.1 > 1.0 - blunt).collect(), 1.0 - sharp);
-    for (h, sharpness) in &kept {
-        dual.sharpness[dual.mesh.edges().edge(*h).index()] = *sharpness;
+    let creases = long_enough(dual, creases(dual, blunt), 1.0 - sharp);
+    for crease in &creases {
+        let edge = dual.mesh.edges().edge(crease.edge).index();
+        dual.sharpness[edge] = crease.sharpness;
     }
-    let kept: Vec<HalfEdgeId> = kept.into_iter().map(|k| k.0).collect();
+    let features: Vec<HalfEdgeId> = creases.into_iter().map(|crease| crease.edge).collect();
     // Every time some patches are united with others, so that fewer are left.
     dual.checkpoint()?;
-    while drop_small_patches(dual, &kept) {
+    while drop_small_patches(dual, &features) {
         dual.checkpoint()?;
     }
-    drop_dangling(dual, &kept);
+    drop_dangling(dual, &features);
     Ok(dual.sharpness.iter().filter(|s| **s > 0.0).count())
+}
+
+/// The edges whose dihedral angle has a cosine below `blunt`, both between their two triangles and between the mean normals
+/// of those around.
+fn creases(dual: &Dual, blunt: f64) -> Vec<Crease> {
+    let normals: Vec<Vec3> = (0..dual.mesh.triangles().len()).map(|f| dual.area_vector(f)).collect();
+    let normal = |h: HalfEdgeId| normals[h.face().index()];
+    let mut candidates: Vec<[HalfEdgeId; 2]> = Vec::new();
+    let mut is_candidate = vec![false; dual.mesh.edges().len()];
+    for h in dual.half_edges() {
+        let Some(twin) = dual.twin(h).filter(|twin| h < *twin) else { continue };
+        if is_bent(normal(h), normal(twin), blunt) {
+            candidates.push([h, twin]);
+            is_candidate[dual.mesh.edges().edge(h).index()] = true;
+        }
+    }
+    let error = position_error(dual);
+    let crease = |half_edges: [HalfEdgeId; 2]| {
+        let sides = half_edges.map(|h| side(dual, &is_candidate, h));
+        let sharpness = sharpness_between(dual, &sides, &normals, error);
+        Crease { edge: half_edges[0], sharpness: sharpness.min(1.0) }
+    };
+    let measured = candidates.into_iter().map(crease);
+    measured.filter(|crease| crease.sharpness > 1.0 - blunt).collect()
+}
+
+/// 1 minus the cosine of the angle between the mean normals of two sides of an edge, or of what is sure of it where vertices
+/// may be off by `error`.
+fn sharpness_between(dual: &Dual, sides: &[Vec<FaceId>; 2], normals: &[Vec3], error: f64) -> f64 {
+    let [m, n] = [0, 1].map(|k| sum_of(normals, &sides[k]));
+    let cos = dot(m, n) / (norm(m) * norm(n));
+    if error == 0.0 {
+        return 1.0 - cos;
+    }
+    let doubt = doubt(dual, &sides[0], m, error) + doubt(dual, &sides[1], n, error);
+    1.0 - (cos.clamp(-1.0, 1.0).acos() - doubt).max(0.0).cos()
 }
 
 /// Unites each patch that is too small to be a face with the neighbour with which it shares most: the features between
@@ -99,19 +126,19 @@ fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId]) -> bool {
     let (patch_of, count) = patches(dual);
     let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
     let small = small_patches(dual, &patch_of, count);
-    let both = features.iter().flat_map(|h| [Some(*h), dual.across(*h)]).flatten();
-    let pairs = both.filter_map(|h| Some((patch(h), patch(dual.across(h)?), dual.length(h))));
+    let both = features.iter().flat_map(|h| [Some(*h), dual.twin(*h)]).flatten();
+    let pairs = both.filter_map(|h| Some((patch(h), patch(dual.twin(h)?), dual.length(h))));
     let mut between: Vec<_> = pairs.filter(|(a, b, _)| a != b && small[*a]).collect();
     between.sort_unstable_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)).then(x.2.total_cmp(&y.2)));
     let mut united = UnionFind::new(count);
     for of_patch in between.chunk_by(|x, y| x.0 == y.0) {
         let shared = of_patch.chunk_by(|x, y| x.1 == y.1).map(|c| (c.iter().map(|b| b.2).sum::<f64>(), c[0].1));
         if let Some((_, neighbour)) = shared.max_by(|x, y| x.0.total_cmp(&y.0).then(y.1.cmp(&x.1))) {
-            united.unite(of_patch[0].0, neighbour);
+            united.merge(of_patch[0].0, neighbour);
         }
     }
     for h in features {
-        let Some(t) = dual.across(*h).filter(|t| patch(*t) != patch(*h)) else { continue };
+        let Some(t) = dual.twin(*h).filter(|t| patch(*t) != patch(*h)) else { continue };
         if united.find(patch(t)) == united.find(patch(*h)) {
             let edge = dual.mesh.edges().edge(*h).index();
             dual.sharpness[edge] = 0.0;
@@ -133,7 +160,7 @@ fn small_patches(dual: &Dual, patch_of: &[u32], count: usize) -> Vec<bool> {
         outlines[patch] += dual.length(h);
         weighed[patch] += sharpness * dual.length(h);
     }
-    let (least, width) = (least_outline(dual), LEAST_WIDTH * dual.total_area().sqrt());
+    let (least, width) = (min_outline(dual), MIN_WIDTH * dual.total_area().sqrt());
     let is_bevel = |p: usize| 2.0 * areas[p] < width * outlines[p] && weighed[p] < BLUNT * outlines[p];
     (0..count).map(|p| weighed[p] < least || is_bevel(p)).collect()
 }
@@ -142,7 +169,7 @@ fn small_patches(dual: &Dual, patch_of: &[u32], count: usize) -> Vec<bool> {
 fn drop_dangling(dual: &mut Dual, features: &[HalfEdgeId]) {
     let (patch_of, _) = patches(dual);
     for h in features {
-        if dual.across(*h).is_some_and(|t| patch_of[t.face().index()] == patch_of[h.face().index()]) {
+        if dual.twin(*h).is_some_and(|t| patch_of[t.face().index()] == patch_of[h.face().index()]) {
             dual.sharpness[dual.mesh.edges().edge(*h).index()] = 0.0;
         }
     }
@@ -167,7 +194,7 @@ fn position_error(dual: &Dual) -> f64 {
 /// area vector is half the sum of p x dp around their outline: it changes by at most half the error times the outline.
 fn doubt(dual: &Dual, faces: &[FaceId], area_vector: Vec3, error: f64) -> f64 {
     let sides = faces.iter().flat_map(|f| [0, 1, 2].map(|k| HalfEdgeId::side_of(*f, k)));
-    let is_outer = |h: &HalfEdgeId| dual.across(*h).is_none_or(|t| !faces.contains(&t.face()));
+    let is_outer = |h: &HalfEdgeId| dual.twin(*h).is_none_or(|t| !faces.contains(&t.face()));
     let outline: f64 = sides.filter(is_outer).map(|h| dual.length(h)).sum();
     (0.5 * error * outline / norm(area_vector)).min(1.0).asin()
 }
@@ -180,7 +207,7 @@ fn side(dual: &Dual, candidate: &[bool], h: HalfEdgeId) -> Vec<FaceId> {
         let face = faces[next];
         next += 1;
         for e in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
-            let Some(t) = dual.across(e).filter(|_| !candidate[dual.mesh.edges().edge(e).index()]) else { continue };
+            let Some(t) = dual.twin(e).filter(|_| !candidate[dual.mesh.edges().edge(e).index()]) else { continue };
             if !faces.contains(&t.face()) {
                 faces.push(t.face());
             }
@@ -194,16 +221,16 @@ fn sum_of(normals: &[Vec3], faces: &[FaceId]) -> Vec3 {
     faces.iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + normals[f.index()][k]))
 }
 
-/// Those of the edges, given with their sharpness, whose connected ones above `strong` are long enough together.
-fn long_enough(dual: &Dual, edges: Vec<(HalfEdgeId, f64)>, strong: f64) -> Vec<(HalfEdgeId, f64)> {
-    let mut sets = UnionFind::new(dual.mesh.points().len());
-    edges.iter().for_each(|(h, _)| {
-        sets.unite(dual.from(*h), dual.to(*h));
-    });
-    let mut lengths = vec![0.0; dual.mesh.points().len()];
-    for (h, _) in edges.iter().filter(|e| e.1 > strong) {
-        lengths[sets.find(dual.from(*h))] += dual.length(*h);
+/// Those of the creases whose connected ones above the sharpness `strong` are long enough together.
+fn long_enough(dual: &Dual, creases: Vec<Crease>, strong: f64) -> Vec<Crease> {
+    let mut chains = UnionFind::new(dual.mesh.points().len());
+    for crease in &creases {
+        chains.merge(dual.from(crease.edge), dual.to(crease.edge));
     }
-    let least = LEAST_LENGTH * dual.total_area().sqrt();
-    edges.into_iter().filter(|(h, _)| lengths[sets.find(dual.from(*h))] >= least).collect()
+    let mut lengths = vec![0.0; dual.mesh.points().len()];
+    for crease in creases.iter().filter(|crease| crease.sharpness > strong) {
+        lengths[chains.find(dual.from(crease.edge))] += dual.length(crease.edge);
+    }
+    let min_length = MIN_LENGTH * dual.total_area().sqrt();
+    creases.into_iter().filter(|crease| lengths[chains.find(dual.from(crease.edge))] >= min_length).collect()
 }

@@ -3,9 +3,9 @@
 use super::assemble::assemble;
 use super::clearance::{Gaps, gaps};
 use super::dual::Dual;
-use super::judge::{Verdict, choose_outer, judge};
+use super::evaluate::{Prediction, choose_outer, evaluate};
 use super::merge::Limits;
-use super::network::{LEAST, Network};
+use super::network::{MIN_SHARE, Network};
 use super::shortest::length;
 use super::straighten::{RELAXED, relax, round_off, straighten};
 use super::voronoi::Cells;
@@ -16,7 +16,7 @@ use crate::topology::{EdgeId, HalfEdgeId};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
-/// seams along a tube come together. So the area ratio is foretold again after every step, and the last good one kept.
+/// seams along a tube come together. So the area ratio is predicted again after every step, and the last good one kept.
 const BANDS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// How far seams may be straightened, as a share of the narrowest gap beside them.
@@ -37,7 +37,7 @@ pub(super) fn finish(
     cells: &Cells,
     size: impl Fn(HalfEdgeId) -> f64,
 ) -> Result<Atlas, Error> {
-    let mut best = Judged::new(Network::new(dual, labels, limits), cells)?;
+    let mut best = Evaluated::new(Network::new(dual, labels, limits), cells)?;
     let bands = if best.network.seams().next().is_some() { &BANDS[..] } else { &[] };
     for (round, band) in bands.iter().enumerate() {
         dual.checkpoint()?;
@@ -53,9 +53,9 @@ pub(super) fn finish(
             best.step(&step, in_part)?;
         }
     }
-    let Judged { network, verdicts, .. } = best.unbent(cells)?;
+    let Evaluated { network, predictions, .. } = best.unbent(cells)?;
     let mut atlas = assemble(dual.mesh, &network.labels)?;
-    choose_outer(&mut atlas, &verdicts);
+    choose_outer(&mut atlas, &predictions);
     Ok(atlas)
 }
 
@@ -80,18 +80,18 @@ enum StepOutcome {
 /// Per pair of charts the half-edges of all closed seams between them.
 type Loops = BTreeMap<[u32; 2], Vec<HalfEdgeId>>;
 
-/// Seams with what is foretold of their charts.
-struct Judged<'a> {
+/// Seams with what is predicted of their charts.
+struct Evaluated<'a> {
     network: Network<'a>,
-    verdicts: Vec<Option<Verdict>>,
+    predictions: Vec<Option<Prediction>>,
     /// The pairs of charts between which closed seams stay where they are.
     held: BTreeSet<[u32; 2]>,
 }
 
-impl<'a> Judged<'a> {
+impl<'a> Evaluated<'a> {
     fn new(network: Network<'a>, cells: &Cells) -> Result<Self, Interrupted> {
-        let verdicts = judge(&network, cells)?;
-        Ok(Self { network, verdicts, held: BTreeSet::new() })
+        let predictions = evaluate(&network, cells)?;
+        Ok(Self { network, predictions, held: BTreeSet::new() })
     }
 
     /// Straightens the seams as far as `breadth` allows, if no chart's ratio rises above the largest one by that;
@@ -106,9 +106,9 @@ impl<'a> Judged<'a> {
         if self.held.len() > known {
             straight = self.straightened(step, &loops, &breadth)?;
         }
-        let ratio = |v: &Option<Verdict>| v.map_or(1.0, |v| v.ratio);
-        let worse = |(new, old): (&Option<Verdict>, &Option<Verdict>)| ratio(new) > step.largest.max(ratio(old));
-        let pairs = straight.verdicts.iter().zip(&self.verdicts);
+        let ratio = |v: &Option<Prediction>| v.map_or(1.0, |v| v.ratio);
+        let worse = |(new, old): (&Option<Prediction>, &Option<Prediction>)| ratio(new) > step.largest.max(ratio(old));
+        let pairs = straight.predictions.iter().zip(&self.predictions);
         let distorted: Vec<u32> = pairs.zip(0..).filter(|(pair, _)| worse(*pair)).map(|(_, label)| label).collect();
         if !distorted.is_empty() || !straight.network.is_sound() {
             return Ok(StepOutcome::Undone { distorted });
@@ -126,7 +126,7 @@ impl<'a> Judged<'a> {
         let edges = self.network.dual.mesh.edges();
         let held = loops.iter().filter(|l| self.held.contains(l.0)).flat_map(|l| l.1);
         let held: BTreeSet<EdgeId> = held.map(|h| edges.edge(*h)).collect();
-        let mut network = self.network.clone().keeping(LEAST);
+        let mut network = self.network.clone().keeping(MIN_SHARE);
         let free = |h: HalfEdgeId| if held.contains(&edges.edge(h)) { 0.0 } else { breadth(h) };
         straighten(&mut network, &step.gaps.crossing, free)?;
         Self::new(network, step.cells)
@@ -136,9 +136,9 @@ impl<'a> Judged<'a> {
     /// becomes shorter by shrinking to a point, and the chart around it is the more distorted for it.
     fn dearer(&self, before: &Loops, straight: &Self) -> Vec<[u32; 2]> {
         let after = straight.loops();
-        let cost = |judged: &Self, pair: &[u32; 2], length: f64| {
-            let of = |label: u32| judged.verdicts[label as usize].map_or(1.0, |v| v.ratio);
-            let area: f64 = pair.iter().map(|l| judged.network.areas[*l as usize]).sum();
+        let cost = |evaluated: &Self, pair: &[u32; 2], length: f64| {
+            let of = |label: u32| evaluated.predictions[label as usize].map_or(1.0, |v| v.ratio);
+            let area: f64 = pair.iter().map(|l| evaluated.network.areas[*l as usize]).sum();
             length / area.sqrt() + of(pair[0]).max(of(pair[1])).log10()
         };
         let length = |path: &[HalfEdgeId]| length(self.network.dual, path);
@@ -153,7 +153,7 @@ impl<'a> Judged<'a> {
         let mut loops = Loops::new();
         let dual = self.network.dual;
         for curve in self.network.curves() {
-            let Some(beyond) = dual.across(curve[0]).filter(|_| dual.is_closed(&curve)) else { continue };
+            let Some(beyond) = dual.twin(curve[0]).filter(|_| dual.is_closed(&curve)) else { continue };
             let mut pair = [curve[0], beyond].map(|h| self.network.label(h));
             pair.sort_unstable();
             loops.entry(pair).or_default().extend(curve);
@@ -178,7 +178,7 @@ impl<'a> Judged<'a> {
         for curve in self.network.curves() {
             let length = curve.len();
             for (i, h) in curve.into_iter().enumerate() {
-                let sides = [Some(h), self.network.dual.across(h)];
+                let sides = [Some(h), self.network.dual.twin(h)];
                 let concerned = sides.into_iter().flatten().any(|s| labels.contains(&self.network.label(s)));
                 part[edges.edge(h).index()] = concerned.then_some(i * PARTS / length);
             }

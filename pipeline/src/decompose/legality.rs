@@ -81,10 +81,10 @@ pub fn verify(
     Ok(boundary_loops)
 }
 
-/// A vertex at which sheets touch that share no edge there: more umbrellas than the boundary half-edges out of it
+/// A vertex at which sheets touch that share no edge there: more fans than the boundary half-edges out of it
 /// account for.
 fn touched(triangles: &[[VertexId; 3]], edges: &EdgeTable, vertices: usize) -> Option<VertexId> {
-    let umbrellas = crate::topology::Umbrellas::new(triangles, edges);
+    let fans = crate::topology::VertexFans::new(triangles, edges);
     let mut seen = vec![false; vertices];
-    umbrellas.vertices(triangles).into_iter().find(|v| std::mem::replace(&mut seen[v.index()], true))
+    fans.vertices(triangles).into_iter().find(|v| std::mem::replace(&mut seen[v.index()], true))
 }

@@ -72,7 +72,7 @@ pub(super) struct Merge<'a, 'b> {
     /// Per region its group: only regions of the same group are united.
     pub groups: Vec<u32>,
     /// Features block unions, but not that of a region around which there is no more of them, weighed by sharpness.
-    pub least_outline: f64,
+    pub min_outline: f64,
     pub checkpoint: &'b Checkpoint<'b>,
 }
 
@@ -94,13 +94,13 @@ impl Merge<'_, '_> {
                 continue;
             }
             let Some(ratio) = best.ratio else {
-                heap.extend(self.judged(best));
+                heap.extend(self.evaluated(best));
                 let cells = [a, b].map(|r| self.regions.all[r as usize].cells.len());
                 self.checkpoint.after(WORK_PER_CELL * (cells[0] + cells[1]))?;
                 continue;
             };
             let Some(union) = self.regions.union(a, b) else { continue };
-            self.regions.unite(a, b, union);
+            self.regions.merge(a, b, union);
             self.ratios[a as usize] = ratio;
             version[a as usize] += 1;
             version[b as usize] += 1;
@@ -124,15 +124,15 @@ impl Merge<'_, '_> {
     }
 
     /// The candidate with its own area ratio; none where that is too large.
-    fn judged(&mut self, candidate: Candidate) -> Option<Candidate> {
+    fn evaluated(&mut self, candidate: Candidate) -> Option<Candidate> {
         let (a, b) = candidate.pair;
         let union = self.regions.union(a, b)?;
         let cells_of = |r: u32| self.regions.all[r as usize].cells.iter().copied();
         let cells: Vec<u32> = cells_of(a).chain(cells_of(b)).collect();
         let loops = &union.outline.loops;
         let ratio = predict(self.regions.complex, self.graph, &cells, loops).area_ratio;
-        let judged = Candidate { cost: self.cost((a, b), &union, ratio), ratio: Some(ratio), ..candidate };
-        (ratio <= self.limits.area_ratio).then_some(judged)
+        let evaluated = Candidate { cost: self.cost((a, b), &union, ratio), ratio: Some(ratio), ..candidate };
+        (ratio <= self.limits.area_ratio).then_some(evaluated)
     }
 
     /// Whether the union may be a chart, its distortion apart.
@@ -142,7 +142,7 @@ impl Merge<'_, '_> {
             region.boundary.iter().map(|a| self.regions.complex.arcs[*a as usize].sharp).sum::<f64>()
         };
         self.limits.allow(&self.regions.shape(&union.region, &union.outline))
-            && (2.0 * union.shared_feature <= union.shared || sharp(a).min(sharp(b)) < self.least_outline)
+            && (2.0 * union.shared_feature <= union.shared || sharp(a).min(sharp(b)) < self.min_outline)
     }
 
     fn cost(&self, (a, b): (u32, u32), union: &Union, ratio: f64) -> f64 {

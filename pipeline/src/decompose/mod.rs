@@ -19,25 +19,25 @@
 //! sorting, but for a fixed number of cells; every loop has its reason to end beside it.
 
 mod assemble;
-mod choice;
 mod clearance;
 mod complex;
 mod dual;
 mod ears;
+mod evaluate;
 mod features;
 mod finish;
-mod judge;
-mod lay;
-mod ldl;
+mod graph_laplacian;
 mod legality;
 mod merge;
 mod network;
 mod patches;
 mod predict;
+mod principal_axes;
 mod regions;
+mod reroute;
 mod search;
+mod selection;
 mod shortest;
-mod sides;
 mod split;
 mod straighten;
 mod voronoi;
@@ -47,17 +47,17 @@ use crate::mesh::SurfaceMesh;
 use crate::monitor::{Interrupted, Monitor};
 use crate::topology::HalfEdgeId;
 pub use assemble::assemble;
-use choice::Choice;
 use complex::Complex;
 use dual::Dual;
 pub use ears::{WithoutEars, split_ears};
-use features::{least_outline, with_features};
+use features::{min_outline, with_features};
 use finish::finish;
 pub use legality::Illegal;
 use merge::Limits;
 use patches::compact_cells;
 use predict::CellGraph;
 use search::Search;
+use selection::Selection;
 use split::legal;
 pub use split::{contact, halve, separate, split};
 use voronoi::{Cells, bisect_until};
@@ -109,11 +109,11 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, monitor: &dyn Monitor)
         bound: settings.max_area_ratio,
         checkpoint: &dual.checkpoint,
     };
-    let choice = Choice { dual: &dual, cells: &cells, limits, bound: settings.max_area_ratio };
-    let charts = choice.of(&search.run()?)?;
-    let charts = search.absorb(charts, least_outline(&dual))?;
-    let labels: Vec<u32> = cells.of.iter().map(|c| charts.of[*c as usize]).collect();
-    let size = |h: HalfEdgeId| graph.area(cells.of[h.face().index()]).sqrt();
+    let selection = Selection { dual: &dual, cells: &cells, limits, bound: settings.max_area_ratio };
+    let charts = selection.charts(&search.run()?)?;
+    let charts = search.absorb(charts, min_outline(&dual))?;
+    let labels: Vec<u32> = cells.labels.iter().map(|c| charts.labels[*c as usize]).collect();
+    let size = |h: HalfEdgeId| graph.area(cells.labels[h.face().index()]).sqrt();
     let atlas = finish(&dual, labels, limits, settings, &cells, size)?;
     dual.checkpoint.end()?;
     Ok(Atlas { feature_edges: features, ..atlas })

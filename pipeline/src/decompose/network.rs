@@ -1,6 +1,6 @@
 //! Charts as labels of triangles, and the seams between them: edges whose triangles bear different labels.
 //!
-//! Seams are moved by one operation: see [`super::lay`].
+//! Seams are moved by one operation: see [`super::reroute`].
 
 use super::dual::Dual;
 use super::merge::Limits;
@@ -9,7 +9,7 @@ use crate::topology::union_find::UnionFind;
 use crate::topology::{HalfEdgeId, VisitStamps};
 
 /// A chart keeps at least this share of its area in a step of straightening.
-pub(super) const LEAST: f64 = 0.5;
+pub(super) const MIN_SHARE: f64 = 0.5;
 
 /// Marks vertices where the surface does not end.
 const INNER: u32 = u32::MAX;
@@ -21,7 +21,7 @@ pub(super) struct Network<'a> {
     pub labels: Vec<u32>,
     pub limits: Limits,
     /// Per label the area that it keeps at least, and the one that it has.
-    pub least: Vec<f64>,
+    pub min_areas: Vec<f64>,
     pub areas: Vec<f64>,
     /// Per label, its triangles, the vertices inside it, and the half-edges around it.
     pub sizes: Vec<usize>,
@@ -50,7 +50,7 @@ impl<'a> Network<'a> {
         let mut made = Self {
             dual,
             limits,
-            least: vec![0.0; count],
+            min_areas: vec![0.0; count],
             areas: vec![0.0; count],
             sizes: vec![0; count],
             inside: vec![0; count],
@@ -81,12 +81,12 @@ impl<'a> Network<'a> {
         for v in 0..vertices {
             made.count_inside(v, 1);
         }
-        made.keeping(LEAST)
+        made.keeping(MIN_SHARE)
     }
 
     /// The same charts, which keep at least this share of the areas that they have now.
     pub(super) fn keeping(self, share: f64) -> Self {
-        Self { least: self.areas.iter().map(|a| share * a).collect(), ..self }
+        Self { min_areas: self.areas.iter().map(|a| share * a).collect(), ..self }
     }
 
     /// Makes the edge along `h` a seam or none.
@@ -156,19 +156,19 @@ impl<'a> Network<'a> {
         let first = self.out[vertex];
         let mut e = first;
         loop {
-            if self.dual.across(e).is_some() {
+            if self.dual.twin(e).is_some() {
                 visit(e);
             }
-            match self.dual.across(e.prev()) {
+            match self.dual.twin(e.prev()) {
                 Some(next) if next != first => e = next,
                 Some(_) => return,
                 None => break,
             }
         }
         let mut e = first;
-        while let Some(t) = self.dual.across(e) {
+        while let Some(t) = self.dual.twin(e) {
             e = t.next();
-            if self.dual.across(e).is_some() {
+            if self.dual.twin(e).is_some() {
                 visit(e);
             }
         }
@@ -240,7 +240,7 @@ impl<'a> Network<'a> {
         self.label(h) == label && self.partition().is_boundary(h)
     }
 
-    /// Whether every chart is connected: the one thing that [`Self::lay`] takes on trust.
+    /// Whether every chart is connected: the one thing that [`Self::reroute`] takes on trust.
     pub(super) fn is_sound(&self) -> bool {
         let mut parts = self.dual.united(|h, twin| self.label(twin) == self.label(h));
         parts.labels().1 == self.charts()
@@ -252,8 +252,8 @@ fn open_loops(dual: &Dual) -> Vec<u32> {
     let vertices = dual.mesh.points().len();
     let mut sets = UnionFind::new(vertices);
     let mut open = vec![false; vertices];
-    for h in dual.half_edges().filter(|h| dual.across(*h).is_none()) {
-        sets.unite(dual.from(h), dual.to(h));
+    for h in dual.half_edges().filter(|h| dual.twin(*h).is_none()) {
+        sets.merge(dual.from(h), dual.to(h));
         (open[dual.from(h)], open[dual.to(h)]) = (true, true);
     }
     (0..vertices).map(|v| if open[v] { sets.find(v) as u32 } else { INNER }).collect()

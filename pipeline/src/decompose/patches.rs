@@ -148,21 +148,21 @@ mod tests {
             farthest_first(&dual, |_| wanted),
         ] {
             let mut seen = vec![false; dual.len()];
-            let mut found = vec![false; cells.count];
+            let mut found = vec![false; cells.len];
             for start in 0..dual.len() {
                 if !seen[start] {
-                    let cell = cells.of[start] as usize;
+                    let cell = cells.labels[start] as usize;
                     assert!(!std::mem::replace(&mut found[cell], true), "cell {cell} is connected");
                     let mut stack = vec![start];
                     while let Some(node) = stack.pop() {
                         seen[node] = true;
-                        let own = |other: &usize| cells.of[*other] == cells.of[node];
+                        let own = |other: &usize| cells.labels[*other] == cells.labels[node];
                         dual.each_neighbour(node, |n, _| stack.extend(Some(n).filter(|n| own(n) && !seen[*n])));
                     }
                 }
             }
             assert!(found.iter().all(|f| *f), "no cell is empty");
-            assert_eq!(cells.count, mesh.census().components * wanted);
+            assert_eq!(cells.len, mesh.topology_summary().components * wanted);
         }
     }
 
@@ -182,8 +182,8 @@ mod tests {
         let mesh = repair(&shapes::flat_disk(60), &Settings::default()).expect("a surface is left").mesh;
         let dual = Dual::new(&mesh, &NoMonitor);
         let cells = compact_cells(&dual, |_| 50, &dual.checkpoint).expect("nobody cancels");
-        let mut sizes = vec![0; cells.count];
-        cells.of.iter().for_each(|c| sizes[*c as usize] += 1);
+        let mut sizes = vec![0; cells.len];
+        cells.labels.iter().for_each(|c| sizes[*c as usize] += 1);
         let mean = mesh.triangles().len() / 50;
         assert!(sizes.iter().all(|s| (mean / 4..3 * mean).contains(s)), "{mean}: {sizes:?}");
     }

@@ -1,4 +1,4 @@
-//! How strongly a harmonic map of a union of cells would stretch: the area ratio, foretold on the graph of cells.
+//! How strongly a harmonic map of a union of cells would stretch: the area ratio, predicted on the graph of cells.
 //!
 //! Cells are finite volumes: a conductance l/d joins two of them (l the length of their common edge, d the distance
 //! of their centroids), and the outer loop is prescribed on the unit circle by arc length, as for the map itself.
@@ -6,7 +6,7 @@
 //! density of its Dirichlet energy; the ratio is that of the extreme quantiles of this density over stars of cells.
 
 use super::complex::{Complex, NONE};
-use super::ldl::Springs;
+use super::graph_laplacian::GraphLaplacian;
 use super::voronoi::Graph;
 use crate::fem::dofs::Dofs;
 use crate::measure::distortion::quantiles;
@@ -127,7 +127,7 @@ impl Graph for CellGraph {
     }
 }
 
-/// The work of foretelling a ratio, per cell: as long as so many triangles are looked at.
+/// The work of predicting a ratio, per cell: as long as so many triangles are looked at.
 pub(super) const WORK_PER_CELL: usize = 20;
 
 /// Parts of this many cells are not dissected.
@@ -143,9 +143,9 @@ struct Run {
 }
 
 /// The runs of a loop.
-fn runs(complex: &Complex, turn: &[u32]) -> Vec<Run> {
+fn runs(complex: &Complex, boundary_loop: &[u32]) -> Vec<Run> {
     let arc = |a: &u32| &complex.arcs[*a as usize];
-    let total: f64 = turn.iter().map(|a| arc(a).length).sum();
+    let total: f64 = boundary_loop.iter().map(|a| arc(a).length).sum();
     let mut travelled = 0.0;
     let run = |run: &[u32]| {
         let length: f64 = run.iter().map(|a| arc(a).length).sum();
@@ -158,7 +158,7 @@ fn runs(complex: &Complex, turn: &[u32]) -> Vec<Run> {
         travelled += length;
         Run { cell: arc(&run[0]).cell, length, middle: arc(half_way.unwrap_or(&run[0])).middle, at }
     };
-    turn.chunk_by(|a, b| arc(a).cell == arc(b).cell).map(run).collect()
+    boundary_loop.chunk_by(|a, b| arc(a).cell == arc(b).cell).map(run).collect()
 }
 
 /// The system of one union.
@@ -166,7 +166,7 @@ struct System<'a> {
     graph: &'a CellGraph,
     /// The unknowns of the union's cells, out of those of the graph.
     dofs: &'a Dofs,
-    /// The places of cells, then those of the nodes that close inner loops.
+    /// Those of the cells, then those of the nodes that close inner loops.
     unknowns: usize,
     links: Vec<([u32; 2], f64)>,
     /// Unknown, conductance, place on the circle.
@@ -200,7 +200,7 @@ pub(super) fn predict(complex: &Complex, graph: &CellGraph, cells: &[u32], loops
         for (i, runs) in runs.iter().enumerate() {
             if i == outer { system.prescribe(runs) } else { system.close(runs, lengths[i] / TAU) }
         }
-        system.solve().map_or(f64::INFINITY, |places| system.ratio(&places))
+        system.solve().map_or(f64::INFINITY, |uv| system.ratio(&uv))
     };
     let mut long = (0..loops.len()).filter(|i| lengths[*i] >= LONG * longest);
     if dofs.count() == 1 {
@@ -261,24 +261,23 @@ impl<'a> System<'a> {
     }
 
     fn solve(&self) -> Option<Vec<[f64; 2]>> {
-        let mut springs = Springs::new(self.unknowns);
-        self.links.iter().for_each(|(pair, w)| springs.join(*pair, *w));
-        self.rim.iter().for_each(|(i, w, place)| springs.hold(*i, *w, *place));
-        springs.rest()
+        let mut laplacian = GraphLaplacian::new(self.unknowns);
+        self.links.iter().for_each(|(pair, w)| laplacian.add_edge(*pair, *w));
+        self.rim.iter().for_each(|(i, w, uv)| laplacian.add_dirichlet(*i, *w, *uv));
+        laplacian.solve()
     }
 
     /// The ratio of the quantiles of the energy density.
-    fn ratio(&self, places: &[[f64; 2]]) -> f64 {
-        let place = |i: u32| places[i as usize];
+    fn ratio(&self, uv: &[[f64; 2]]) -> f64 {
         let squared = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2);
         let mut energy = vec![0.0; self.unknowns];
         for ([i, j], w) in &self.links {
-            let half = 0.5 * w * squared(place(*i), place(*j));
+            let half = 0.5 * w * squared(uv[*i as usize], uv[*j as usize]);
             energy[*i as usize] += half;
             energy[*j as usize] += half;
         }
         for (i, w, p) in &self.rim {
-            energy[*i as usize] += w * squared(place(*i), *p);
+            energy[*i as usize] += w * squared(uv[*i as usize], *p);
         }
         let mut densities: Vec<(f64, f64)> = (0..self.dofs.count()).map(|i| self.density(i, &energy)).collect();
         let [low, high] = quantiles(&mut densities, [QUANTILE, 1.0 - QUANTILE]);

@@ -31,7 +31,7 @@ pub(super) struct Outline {
     pub loops: Vec<Vec<u32>>,
     /// How often it visits a vertex again.
     pub pinches: usize,
-    /// Whether the region lies on both sides of an edge of its boundary: see [`super::dual::Dual::foes`].
+    /// Whether the region lies on both sides of an edge of its boundary: see [`super::dual::Dual::coincident_faces`].
     pub meets_itself: bool,
 }
 
@@ -147,7 +147,7 @@ impl<'a> Regions<'a> {
             |arc, begins| {
                 let half = &union.complex.arcs[arc as usize];
                 outline.pinches += usize::from(!seen_corners.visit(half.from as usize));
-                outline.meets_itself |= half.foes.iter().any(|cell| union.has(*cell));
+                outline.meets_itself |= half.coincident_cells.iter().any(|cell| union.has(*cell));
                 match outline.loops.last_mut() {
                     Some(open) if !begins => open.push(arc),
                     _ => outline.loops.push(vec![arc]),
@@ -202,7 +202,7 @@ impl<'a> Regions<'a> {
     }
 
     /// Makes the union of `a` and `b`, which becomes region `a`.
-    pub(super) fn unite(&mut self, a: u32, b: u32, union: Union) {
+    pub(super) fn merge(&mut self, a: u32, b: u32, union: Union) {
         let cells = std::mem::take(&mut self.all[b as usize]).cells;
         cells.iter().for_each(|c| self.of_cell[*c as usize] = a);
         let mut all = std::mem::take(&mut self.all[a as usize].cells);

@@ -1,4 +1,4 @@
-//! The search for few charts: growing them several ways, and ranking these for each component.
+//! The search for few charts: growing them by several strategies, and ranking these for each component.
 //!
 //! Growing is greedy, and what is cheap early may bar the way later. It costs little on the graph of cells: so it is
 //! done from several numbers of regions, with several weights, and from the two sides of the shape. Fewer charts win;
@@ -7,38 +7,38 @@
 use super::complex::{Complex, NONE};
 use super::merge::{Limits, Merge, Weights};
 use super::predict::{CellGraph, WORK_PER_CELL, predict};
+use super::principal_axes::{Axes, faces_along, principal_axes};
 use super::regions::{Region, Regions};
-use super::sides::{Axes, axes, faces};
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use crate::monitor::{Checkpoint, Interrupted};
 
 const BALANCED: Weights = Weights { ratio: 1.0, roundness: 0.6, spread: 0.5, shared: 0.0 };
 const COMPACT: Weights = Weights { ratio: 0.5, roundness: 0.6, spread: 0.5, shared: 1.0 };
 
-/// One way of growing charts.
-struct Way {
+/// A strategy of growing charts.
+struct Strategy {
     /// Regions per component to begin with.
     regions: usize,
     weights: Weights,
-    /// The axis (see [`axes`]) on either side of which charts grow before they may cross over.
+    /// The axis (see [`principal_axes`]) on either side of which charts grow before they may cross over.
     axis: Option<usize>,
 }
 
-const fn way(regions: usize, weights: Weights, axis: Option<usize>) -> Way {
-    Way { regions, weights, axis }
+const fn strategy(regions: usize, weights: Weights, axis: Option<usize>) -> Strategy {
+    Strategy { regions, weights, axis }
 }
 
-/// (Of fifteen ways without sides that were tried on 25 surfaces, these found the fewest charts between them.)
-const WAYS: [Way; 9] = [
-    way(96, BALANCED, None),
-    way(128, BALANCED, None),
-    way(160, BALANCED, None),
-    way(240, BALANCED, None),
-    way(96, COMPACT, None),
-    way(240, COMPACT, None),
-    way(160, BALANCED, Some(0)),
-    way(160, BALANCED, Some(1)),
-    way(160, BALANCED, Some(2)),
+/// (Of fifteen strategies without sides that were tried on 25 surfaces, these found the fewest charts between them.)
+const STRATEGIES: [Strategy; 9] = [
+    strategy(96, BALANCED, None),
+    strategy(128, BALANCED, None),
+    strategy(160, BALANCED, None),
+    strategy(240, BALANCED, None),
+    strategy(96, COMPACT, None),
+    strategy(240, COMPACT, None),
+    strategy(160, BALANCED, Some(0)),
+    strategy(160, BALANCED, Some(1)),
+    strategy(160, BALANCED, Some(2)),
 ];
 
 /// What seams as long as the square root of the area count, against a decade of the worst area ratio. (They will be a
@@ -58,69 +58,69 @@ pub(super) struct Search<'a> {
 /// A component is left whole up to this share of the largest area ratio: it has no seams that would change it.
 const WHOLE: f64 = 0.5;
 
-/// What became of the component in one of the ways; less is better.
+/// What became of a component by one of the strategies; less is better.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(super) struct Score {
     pub charts: usize,
-    beauty: f64,
+    cost: f64,
 }
 
-/// A way in which a component was grown, and what became of it.
+/// A strategy by which a component was grown, and what became of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ranked {
     pub score: Score,
-    /// Which way: its place among the results.
-    pub way: usize,
+    /// Which strategy: its place among the results.
+    pub strategy: usize,
 }
 
 /// What the search found.
-pub(super) struct Found {
+pub(super) struct SearchResult {
     /// The components of the cells.
     pub components: Cells,
-    /// Per component the ways that lead to charts, the best first.
+    /// Per component the strategies that lead to charts, the best first.
     pub ranked: Vec<Vec<Ranked>>,
-    /// Per way, for each cell its chart.
-    ways: Vec<Vec<u32>>,
+    /// By strategy, for each cell its chart.
+    strategies: Vec<Vec<u32>>,
 }
 
-impl Found {
-    /// Per cell its chart, each component grown in the way that is `chosen` for it.
+impl SearchResult {
+    /// Per cell its chart, each component grown by the strategy that is `chosen` for it.
     pub(super) fn charts(&self, chosen: &[usize]) -> Cells {
-        // Charts of different ways have different numbers.
-        let span = self.components.of.len();
+        // Charts of different strategies have different numbers.
+        let span = self.components.labels.len();
         let chart = |(cell, component): (usize, &u32)| {
-            let way = chosen[*component as usize];
-            (way * span + self.ways[way][cell] as usize) as u32
+            let strategy = chosen[*component as usize];
+            (strategy * span + self.strategies[strategy][cell] as usize) as u32
         };
-        Cells::renumbered(self.components.of.iter().enumerate().map(chart).collect())
+        Cells::renumbered(self.components.labels.iter().enumerate().map(chart).collect())
     }
 }
 
 impl Search<'_> {
-    pub(super) fn run(&self) -> Result<Found, Interrupted> {
+    pub(super) fn run(&self) -> Result<SearchResult, Interrupted> {
         let components = farthest_first(self.graph, |_| 1);
-        let whole = Regions::new(self.complex, components.of.clone(), components.count);
+        let whole = Regions::new(self.complex, components.labels.clone(), components.len);
         let whole = self.fine(whole, WHOLE * self.bound)?;
-        let mut ways = vec![components.of.clone()];
+        let mut strategies = vec![components.labels.clone()];
         let left_whole =
-            |w: &bool| if *w { vec![Ranked { score: Score { charts: 1, beauty: 0.0 }, way: 0 }] } else { vec![] };
+            |w: &bool| if *w { vec![Ranked { score: Score { charts: 1, cost: 0.0 }, strategy: 0 }] } else { vec![] };
         let mut ranked: Vec<Vec<Ranked>> = whole.iter().map(left_whole).collect();
-        let axes = axes(self.complex, &components);
-        for way in WAYS.iter().filter(|_| whole.contains(&false)) {
-            let (of, scores) = self.grow(way, &components, &axes, &whole)?;
+        let axes = principal_axes(self.complex, &components);
+        for strategy in STRATEGIES.iter().filter(|_| whole.contains(&false)) {
+            let (of, scores) = self.grow(strategy, &components, &axes, &whole)?;
             for (component, score) in scores.into_iter().enumerate() {
                 if !whole[component] {
-                    ranked[component].push(Ranked { score, way: ways.len() });
+                    ranked[component].push(Ranked { score, strategy: strategies.len() });
                 }
             }
-            ways.push(of);
+            strategies.push(of);
         }
         let order = |a: &Ranked, b: &Ranked| {
             let by_charts = a.score.charts.cmp(&b.score.charts);
-            by_charts.then(a.score.beauty.total_cmp(&b.score.beauty)).then(a.way.cmp(&b.way))
+            by_charts.then(a.score.cost.total_cmp(&b.score.cost)).then(a.strategy.cmp(&b.strategy))
         };
         ranked.iter_mut().for_each(|r| r.sort_by(order));
-        Ok(Found { components, ranked, ways })
+        Ok(SearchResult { components, ranked, strategies })
     }
 
     /// Per region, whether it may be a chart with at most this area ratio.
@@ -137,30 +137,30 @@ impl Search<'_> {
         Ok(fine)
     }
 
-    /// Grows charts one way: per cell its chart, and the score of every component.
+    /// Grows charts by one strategy: per cell its chart, and the score of every component.
     fn grow(
         &self,
-        way: &Way,
+        strategy: &Strategy,
         components: &Cells,
         axes: &[Axes],
         whole: &[bool],
     ) -> Result<(Vec<u32>, Vec<Score>), Interrupted> {
-        let is_whole = |cell: usize| whole[components.of[cell] as usize];
-        let groups = farthest_first(self.graph, |part| if is_whole(part[0]) { 1 } else { way.regions });
+        let is_whole = |cell: usize| whole[components.labels[cell] as usize];
+        let groups = farthest_first(self.graph, |part| if is_whole(part[0]) { 1 } else { strategy.regions });
         let groups = bisect_until(self.graph, groups, |groups| {
-            self.fine(Regions::new(self.complex, groups.of.clone(), groups.count), self.limits.area_ratio)
+            self.fine(Regions::new(self.complex, groups.labels.clone(), groups.len), self.limits.area_ratio)
         })?;
-        let mut regions = Regions::new(self.complex, groups.of, groups.count);
-        let component = |r: &Region| r.cells.first().map_or(0, |c| components.of[*c as usize]);
+        let mut regions = Regions::new(self.complex, groups.labels, groups.len);
+        let component = |r: &Region| r.cells.first().map_or(0, |c| components.labels[*c as usize]);
         let side = |axis: usize| {
-            let is_front = |r: &Region| faces(r, axes[component(r) as usize][axis]);
+            let is_front = |r: &Region| faces_along(r, axes[component(r) as usize][axis]);
             regions.all.iter().map(|r| 2 * component(r) + u32::from(is_front(r))).collect::<Vec<u32>>()
         };
         let wholes = regions.all.iter().map(component).collect();
-        let rounds: Vec<Vec<u32>> = way.axis.map(side).into_iter().chain([wholes]).collect();
-        let mut ratios = vec![1.0; groups.count];
+        let rounds: Vec<Vec<u32>> = strategy.axis.map(side).into_iter().chain([wholes]).collect();
+        let mut ratios = vec![1.0; groups.len];
         for groups in rounds {
-            self.merge(&mut regions, &mut ratios, groups, way.weights, 0.0)?;
+            self.merge(&mut regions, &mut ratios, groups, strategy.weights, 0.0)?;
         }
         let scores = self.scores(&regions, &ratios, components);
         Ok((regions.of_cell, scores))
@@ -168,10 +168,10 @@ impl Search<'_> {
 
     /// Unites charts across features wherever these are not sharp and long enough to part them, whatever their
     /// component.
-    pub(super) fn absorb(&self, charts: Cells, least_outline: f64) -> Result<Cells, Interrupted> {
-        let count = charts.count;
-        let mut regions = Regions::new(self.complex, charts.of, count);
-        self.merge(&mut regions, &mut vec![1.0; count], vec![0; count], BALANCED, least_outline)?;
+    pub(super) fn absorb(&self, charts: Cells, min_outline: f64) -> Result<Cells, Interrupted> {
+        let count = charts.len;
+        let mut regions = Regions::new(self.complex, charts.labels, count);
+        self.merge(&mut regions, &mut vec![1.0; count], vec![0; count], BALANCED, min_outline)?;
         Ok(Cells::renumbered(regions.of_cell))
     }
 
@@ -181,17 +181,17 @@ impl Search<'_> {
         ratios: &mut [f64],
         groups: Vec<u32>,
         weights: Weights,
-        least_outline: f64,
+        min_outline: f64,
     ) -> Result<(), Interrupted> {
         let (graph, limits, checkpoint) = (self.graph, self.limits, self.checkpoint);
-        Merge { regions, graph, limits, weights, ratios, groups, least_outline, checkpoint }.run()
+        Merge { regions, graph, limits, weights, ratios, groups, min_outline, checkpoint }.run()
     }
 
     /// The score of every component.
     fn scores(&self, regions: &Regions, ratios: &[f64], components: &Cells) -> Vec<Score> {
-        let mut sums = vec![(0, 0.0, 0.0, 1.0_f64); components.count];
+        let mut sums = vec![(0, 0.0, 0.0, 1.0_f64); components.len];
         for (region, ratio) in regions.all.iter().zip(ratios).filter(|(r, _)| !r.cells.is_empty()) {
-            let (charts, seams, area, worst) = &mut sums[components.of[region.cells[0] as usize] as usize];
+            let (charts, seams, area, worst) = &mut sums[components.labels[region.cells[0] as usize] as usize];
             let seam = region.boundary.iter().map(|a| &self.complex.arcs[*a as usize]).filter(|a| a.twin != NONE);
             *charts += 1;
             *seams += 0.5 * seam.map(|a| a.length).sum::<f64>();
@@ -200,7 +200,7 @@ impl Search<'_> {
         }
         let score = |(charts, seams, area, worst): (usize, f64, f64, f64)| Score {
             charts,
-            beauty: SEAMS * seams / area.sqrt() + worst.log10(),
+            cost: SEAMS * seams / area.sqrt() + worst.log10(),
         };
         sums.into_iter().map(score).collect()
     }

@@ -22,7 +22,7 @@ pub(super) fn length(dual: &Dual, path: &[HalfEdgeId]) -> f64 {
 
 /// A path with its reverse.
 pub(super) fn reversed(dual: &Dual, path: &[HalfEdgeId]) -> Vec<HalfEdgeId> {
-    path.iter().rev().filter_map(|h| dual.across(*h)).collect()
+    path.iter().rev().filter_map(|h| dual.twin(*h)).collect()
 }
 
 /// A tree of shortest paths, of vertices that were reached.
@@ -198,7 +198,7 @@ impl Bounds<'_> {
         let free = network.degree(to) == 0 && self.band[to] && !network.is_open(to);
         (free || may_end(to) && !network.is_seam(h))
             && !self.barred[network.dual.mesh.edges().edge(h).index()]
-            && (!at_root || inside(h) && network.dual.across(h).is_some_and(inside))
+            && (!at_root || inside(h) && network.dual.twin(h).is_some_and(inside))
     }
 }
 

@@ -60,7 +60,7 @@ pub fn separate(
     settings: &Settings,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Chart>, Error> {
-    let cut = |dual: &Dual, limits: &Limits| bisected(dual, Cells { of: nearer_end(dual, ends), count: 2 }, limits);
+    let cut = |dual: &Dual, limits: &Limits| bisected(dual, Cells { labels: nearer_end(dual, ends), len: 2 }, limits);
     pieces(chart, cut, settings, monitor)
 }
 
@@ -71,7 +71,7 @@ pub fn separate(
 /// As [`split`].
 pub fn halve(chart: &Chart, is_left: &[bool], settings: &Settings, monitor: &dyn Monitor) -> Result<Vec<Chart>, Error> {
     let cut =
-        |dual: &Dual, limits: &Limits| bisected(dual, Cells { of: largest_parts(dual, is_left), count: 2 }, limits);
+        |dual: &Dual, limits: &Limits| bisected(dual, Cells { labels: largest_parts(dual, is_left), len: 2 }, limits);
     pieces(chart, cut, settings, monitor)
 }
 
@@ -115,7 +115,7 @@ fn pieces(
     let limits = Limits::new(settings);
     let labels = cut(&dual, &limits)?;
     let (cells, _) = cells(&dual, &limits)?;
-    let size = dual.total_area() / cells.count as f64;
+    let size = dual.total_area() / cells.len as f64;
     let pieces = finish(&dual, labels, limits, settings, &cells, |_| size.sqrt())?;
     dual.checkpoint.end()?;
     let on_surface = |piece: &Chart| Chart {
@@ -149,7 +149,7 @@ fn grow(dual: &Dual, mut labels: Vec<u32>, mut front: Vec<FaceId>) -> Vec<u32> {
         let mut next = Vec::new();
         for face in front {
             for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
-                let Some(other) = dual.across(h).map(HalfEdgeId::face) else { continue };
+                let Some(other) = dual.twin(h).map(HalfEdgeId::face) else { continue };
                 if labels[other.index()] == u32::MAX {
                     labels[other.index()] = labels[face.index()];
                     next.push(other);
@@ -169,7 +169,7 @@ fn halves(dual: &Dual, limits: &Limits) -> Result<Vec<u32>, Interrupted> {
 /// The labels of cells that are bisected until all are charts.
 fn bisected(dual: &Dual, cells: Cells, limits: &Limits) -> Result<Vec<u32>, Interrupted> {
     let cells = bisect_until(dual, cells, |groups| legal(dual, &Complex::new(dual, groups), limits))?;
-    Ok(cells.of)
+    Ok(cells.labels)
 }
 
 /// Per cell, whether it may be a chart. A safe point.
@@ -190,12 +190,12 @@ fn across_protrusion(dual: &Dual, log_scale: &[f64], limits: &Limits) -> Result<
     let mut best: Option<(f64, Vec<u32>)> = None;
     for level in LEVELS {
         let Some(labels) = below(dual, log_scale, low + level * (high - low)) else { continue };
-        let groups = Cells { of: labels, count: 2 };
-        let cost = cut_length(dual, &groups.of) * (1.0 + OFF_CENTRE * (level - 0.5).abs());
+        let groups = Cells { labels, len: 2 };
+        let cost = cut_length(dual, &groups.labels) * (1.0 + OFF_CENTRE * (level - 0.5).abs());
         let is_legal = legal(dual, &Complex::new(dual, &groups), limits)?.iter().all(|l| *l);
         // Of cuts that cost the same, the first one.
         if is_legal && best.as_ref().is_none_or(|b| cost.total_cmp(&b.0).is_lt()) {
-            best = Some((cost, groups.of));
+            best = Some((cost, groups.labels));
         }
     }
     Ok(best.map(|(_, labels)| labels))

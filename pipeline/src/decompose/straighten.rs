@@ -6,8 +6,8 @@
 //! falls with every change, and the number of rounds is fixed.
 
 use super::dual::Dual;
-use super::lay::Path;
 use super::network::Network;
+use super::reroute::Path;
 use super::shortest::{Bounds, Goal, Tree, length, reversed, weight};
 use crate::monitor::Interrupted;
 use crate::topology::HalfEdgeId;
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 /// Rounds over all seams and corners, and the share of the length that makes another one worth while.
 const ROUNDS: usize = 2;
-const LEAST_GAIN: f64 = 5e-3;
+const MIN_GAIN: f64 = 5e-3;
 
 /// Pieces of fewer edges are not looked at.
 const FEW: usize = 4;
@@ -41,7 +41,16 @@ struct Straightening<'n, 'a> {
     share: f64,
     /// The seams, and the corners with their seams, that were tried in vain: they are not tried again before they
     /// have changed.
-    vain: BTreeSet<(Option<usize>, Vec<HalfEdgeId>)>,
+    vain: BTreeSet<Tried>,
+}
+
+/// What was to be shortened.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Tried {
+    /// A seam.
+    Seam(Vec<HalfEdgeId>),
+    /// A corner, with its seams as far as they are laid anew with it.
+    Corner(usize, Vec<HalfEdgeId>),
 }
 
 /// What became of a seam that was to be replaced by the shortest path.
@@ -73,7 +82,7 @@ pub(super) fn straighten(
         work.seams()?;
         work.corners()?;
         let after = work.total();
-        if after >= (1.0 - LEAST_GAIN) * before {
+        if after >= (1.0 - MIN_GAIN) * before {
             break;
         }
         before = after;
@@ -82,8 +91,8 @@ pub(super) fn straighten(
 }
 
 /// Pulls straight the seams of charts that are `wanted`, and parts of them, that are more than `bent` times as long as
-/// they must be, as far as the others let it, and whatever becomes of the charts, as long as they are legal. Corners stay where they are, and
-/// closed seams are held at [`PINS`] of their vertices. Whether anything changed.
+/// they must be, as far as the others let it, and whatever becomes of the charts, as long as they are legal. Corners stay
+/// where they are, and closed seams are held at [`PINS`] of their vertices. Whether anything changed.
 ///
 /// # Errors
 /// As [`straighten`].
@@ -147,11 +156,10 @@ impl<'n, 'a> Straightening<'n, 'a> {
     fn seams(&mut self) -> Result<(), Interrupted> {
         for path in self.network.curves() {
             let closed = self.dual.is_closed(&path);
-            let tried = (None, path);
+            let tried = Tried::Seam(path.clone());
             if self.vain.contains(&tried) {
                 continue;
             }
-            let path = tried.1.clone();
             let shorter = if closed { self.shorten_loop(path, 3, 12)? } else { self.shorten_all(path)? };
             if !shorter {
                 self.vain.insert(tried);
@@ -189,12 +197,12 @@ impl<'n, 'a> Straightening<'n, 'a> {
         let (Some(first), Some(last)) = (path.first().copied(), path.last().copied()) else {
             return Ok(Shortened::Straight);
         };
-        let Some(beyond) = self.dual.across(first) else { return Ok(Shortened::Straight) };
+        let Some(beyond) = self.dual.twin(first) else { return Ok(Shortened::Straight) };
         let (left, right) = (self.network.label(first), self.network.label(beyond));
         let (from, to) = (self.dual.from(first), self.dual.to(last));
         let labels = [left, right];
         let before = length(self.dual, path);
-        self.network.lift(path);
+        self.network.remove_seam(path);
         let bounds = Bounds {
             goal: Goal::Vertex(to),
             labels: &labels,
@@ -204,10 +212,10 @@ impl<'n, 'a> Straightening<'n, 'a> {
         };
         self.trees[0].grow(self.network, from, &bounds)?;
         let Some(half_edges) = self.trees[0].path(self.dual, to) else {
-            self.network.put_back(path);
+            self.network.restore_seam(path);
             return Ok(Shortened::Straight);
         };
-        let laid = self.network.lay(path, &[Path { half_edges: half_edges.clone(), left, right }], &labels);
+        let laid = self.network.reroute(path, &[Path { half_edges: half_edges.clone(), left, right }], &labels);
         Ok(if laid { Shortened::To(half_edges) } else { Shortened::Illegal })
     }
 
@@ -237,7 +245,7 @@ impl<'n, 'a> Straightening<'n, 'a> {
                 _ => continue,
             };
             let arms: Vec<_> = seams.iter().map(|h| self.network.follow(*h, self.reach)).collect();
-            let tried = (Some(vertex), arms.concat());
+            let tried = Tried::Corner(vertex, arms.concat());
             if self.vain.contains(&tried) {
                 continue;
             }
@@ -265,16 +273,16 @@ impl<'n, 'a> Straightening<'n, 'a> {
         let before: f64 = arms.iter().map(|a| length(self.dual, a)).sum();
         let sides: Vec<_> = starts
             .iter()
-            .filter_map(|h| Some((self.network.label(*h), self.network.label(self.dual.across(*h)?))))
+            .filter_map(|h| Some((self.network.label(*h), self.network.label(self.dual.twin(*h)?))))
             .collect();
-        arms.iter().for_each(|a| self.network.lift(a));
+        arms.iter().for_each(|a| self.network.remove_seam(a));
         let Some(ways) = self.meeting(&ends, &labels, before)? else {
-            arms.iter().for_each(|a| self.network.put_back(a));
+            arms.iter().for_each(|a| self.network.restore_seam(a));
             return Ok(false);
         };
         let path = |(half_edges, (left, right))| Path { half_edges, left, right };
         let paths: Vec<Path> = ways.into_iter().zip(sides).map(path).collect();
-        Ok(self.network.lay(&arms.concat(), &paths, &labels))
+        Ok(self.network.reroute(&arms.concat(), &paths, &labels))
     }
 
     /// The ways from the vertex where the sum of the distances to three `ends` is least, if it is less than `before`.
@@ -308,11 +316,11 @@ impl<'n, 'a> Straightening<'n, 'a> {
     fn slide(&mut self, end: usize, arm: &[HalfEdgeId]) -> Result<bool, Interrupted> {
         let start = arm[0];
         let root = self.dual.to(arm[arm.len() - 1]);
-        let Some(beyond) = self.dual.across(start) else { return Ok(false) };
+        let Some(beyond) = self.dual.twin(start) else { return Ok(false) };
         let (left, right) = (self.network.label(start), self.network.label(beyond));
         let labels = [left, right];
         let before = length(self.dual, arm);
-        self.network.lift(arm);
+        self.network.remove_seam(arm);
         let bounds = Bounds {
             goal: Goal::OpenLoop(end),
             labels: &labels,
@@ -324,11 +332,11 @@ impl<'n, 'a> Straightening<'n, 'a> {
         tree.grow(self.network, root, &bounds)?;
         let open = tree.settled.last().copied().filter(|v| *v != root && self.network.on_one_loop(*v, end));
         let Some(path) = open.and_then(|vertex| tree.path(self.dual, vertex)) else {
-            self.network.put_back(arm);
+            self.network.restore_seam(arm);
             return Ok(false);
         };
         let half_edges = reversed(self.dual, &path);
-        Ok(self.network.lay(arm, &[Path { half_edges, left, right }], &labels))
+        Ok(self.network.reroute(arm, &[Path { half_edges, left, right }], &labels))
     }
 }
 

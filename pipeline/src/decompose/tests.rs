@@ -148,7 +148,7 @@ fn prediction_agrees_with_the_map_within_a_decade() {
         let limits = Limits::new(&smooth());
         let (cells, _) = cells(&dual, &limits).expect("nobody cancels");
         let network = network::Network::new(&dual, vec![0; mesh.triangles().len()], limits);
-        let predicted = judge::judge(&network, &cells).expect("nobody interrupts")[0].expect("a chart").ratio;
+        let predicted = evaluate::evaluate(&network, &cells).expect("nobody interrupts")[0].expect("a chart").ratio;
         let chart = assemble(&mesh, &network.labels).expect("a disk").into_charts().remove(0);
         let measured = parametrize_chart(chart, Order::Linear).expect("maps").distortion().area_ratio;
         assert!((predicted / measured).log10().abs() < 1.0, "length {length}: {predicted:.1e}, {measured:.1e}");
@@ -211,7 +211,7 @@ fn fingers_are_pulled_straight() {
     let comb = |[x, y, _]: [f64; 3]| u32::from(x > 0.7 * (9.0 * y).sin() * (1.0 - y * y));
     let labels: Vec<u32> = (0..mesh.triangles().len()).map(|f| comb(place(f))).collect();
     let crooked = seam_length(&mesh, &assemble(&mesh, &labels).expect("two disks"));
-    let size = (dual.total_area() / cells.count as f64).sqrt();
+    let size = (dual.total_area() / cells.len as f64).sqrt();
     let atlas = finish(&dual, labels, limits, &smooth(), &cells, |_| size).expect("two disks");
     let straight = seam_length(&mesh, &atlas);
     assert!(crooked > 5.0 && straight < 2.2, "{crooked} becomes {straight}");
@@ -257,7 +257,7 @@ fn figure_eight(around: u32, length: u32) -> TriangleSoup {
 #[test]
 fn no_chart_meets_itself_where_sheets_were_taken_apart() {
     let mesh = surface(&figure_eight(24, 12));
-    assert_eq!(mesh.census().nonmanifold_edges, 12);
+    assert_eq!(mesh.topology_summary().nonmanifold_edges, 12);
     let atlas = decompose(&mesh, &smooth(), &NoMonitor).expect("an atlas");
     assert!(atlas.charts().len() <= 4, "{}", atlas.charts().len());
     for chart in atlas.charts() {

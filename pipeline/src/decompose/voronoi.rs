@@ -24,8 +24,9 @@ pub(super) trait Graph {
 #[derive(Clone, Debug)]
 pub(super) struct Cells {
     /// Per node its cell.
-    pub of: Vec<u32>,
-    pub count: usize,
+    pub labels: Vec<u32>,
+    /// The number of cells.
+    pub len: usize,
 }
 
 /// The cells while seeds are added.
@@ -119,7 +120,7 @@ impl<'a, G: Graph> Growth<'a, G> {
 pub(super) fn farthest_first<G: Graph>(graph: &G, wanted: impl Fn(&[usize]) -> usize) -> Cells {
     let mut growth = Growth::new(graph);
     let count = growth.all(wanted);
-    Cells { of: labels(&growth.paths, graph.len()), count }
+    Cells { labels: labels(&growth.paths, graph.len()), len: count }
 }
 
 /// The seeds of [`farthest_first`], in the order of their cells.
@@ -140,7 +141,7 @@ pub(super) fn nearest<G: Graph>(graph: &G, seeds: &[usize]) -> Cells {
             paths.reach(other, node.distance + step, node.label);
         });
     }
-    Cells { of: labels(&paths, graph.len()), count: seeds.len() }
+    Cells { labels: labels(&paths, graph.len()), len: seeds.len() }
 }
 
 /// Per node its cell.
@@ -198,30 +199,30 @@ pub(super) fn bisect_until<G: Graph>(
 ) -> Result<Cells, Interrupted> {
     loop {
         let fine = fine(&cells)?;
-        let coarse: Vec<usize> = (0..cells.of.len()).filter(|i| !fine[cells.of[*i] as usize]).collect();
+        let coarse: Vec<usize> = (0..cells.labels.len()).filter(|i| !fine[cells.labels[*i] as usize]).collect();
         if coarse.is_empty() {
             return Ok(cells);
         }
-        let within = Within { graph, of: &cells.of };
+        let within = Within { graph, of: &cells.labels };
         let mut growth = Growth::new(&within);
-        let mut count = cells.count as u32;
+        let mut count = cells.len as u32;
         for node in coarse {
             if growth.paths.label(node).is_none() {
                 count = growth.component(node, count, |_| 2);
             }
         }
-        let halved = cells.of.iter().enumerate().map(|(node, cell)| growth.paths.label(node).unwrap_or(*cell));
+        let halved = cells.labels.iter().enumerate().map(|(node, cell)| growth.paths.label(node).unwrap_or(*cell));
         cells = Cells::renumbered(halved.collect());
     }
 }
 
 impl Cells {
     /// The cells of these labels, numbered in the order of their first nodes.
-    pub(super) fn renumbered(mut of: Vec<u32>) -> Self {
-        let highest = of.iter().max().map_or(0, |m| *m as usize + 1);
+    pub(super) fn renumbered(mut labels: Vec<u32>) -> Self {
+        let highest = labels.iter().max().map_or(0, |m| *m as usize + 1);
         let mut number = vec![NO_CELL; highest];
         let mut count = 0;
-        for cell in &mut of {
+        for cell in &mut labels {
             let new = &mut number[*cell as usize];
             if *new == NO_CELL {
                 *new = count;
@@ -229,6 +230,6 @@ impl Cells {
             }
             *cell = *new;
         }
-        Self { of, count: count as usize }
+        Self { labels, len: count as usize }
     }
 }

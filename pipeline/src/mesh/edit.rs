@@ -40,9 +40,9 @@ impl MeshEditor {
     /// If a triangle was split before, as its half-edges are not those of the surface any more; if the half-edges do not run
     /// along one edge in opposite directions.
     pub(crate) fn split_edge(&mut self, sides: [HalfEdgeId; 2]) -> Option<[FaceId; 2]> {
+        assert!(sides.iter().all(|h| !self.is_split[h.face().index()]), "a triangle is split twice");
         let ends = sides.map(|h| [self.from(h), self.from(h.next())]);
         assert!(ends[0][0] == ends[1][1] && ends[0][1] == ends[1][0], "{sides:?} are the sides of no edge");
-        assert!(sides.iter().all(|h| !self.is_split[h.face().index()]), "a triangle is split twice");
         let middle = VertexId::at(self.mesh.points.len());
         let parts = sides.map(|side| self.halves(side, middle));
         if parts.iter().flatten().any(|(_, shape)| shape.area() == 0.0) {
@@ -53,7 +53,7 @@ impl MeshEditor {
         self.mesh.welded.push(self.next_welded);
         self.next_welded += 1;
         let added = [0, 1].map(|side| self.replace(sides[side].face(), parts[side]));
-        let counts = &mut self.mesh.census;
+        let counts = &mut self.mesh.summary;
         counts.vertices += 1;
         counts.edges += 3;
         counts.triangles += 2;
@@ -127,7 +127,7 @@ mod tests {
             }
             let after = editor.finish();
             after.assert_sound();
-            let (old, new) = (before.census(), after.census());
+            let (old, new) = (before.topology_summary(), after.topology_summary());
             assert_eq!((new.triangles, new.vertices), (old.triangles + 2 * split, old.vertices + split));
             assert_eq!((new.euler, new.genus, new.boundary_loops), (old.euler, old.genus, old.boundary_loops));
             assert!((after.area() / before.area() - 1.0).abs() < 1e-13);
@@ -146,7 +146,7 @@ mod tests {
         let mut editor = MeshEditor::new(mesh.clone());
         assert_eq!(editor.split_edge([HalfEdgeId(0), HalfEdgeId(3)]), None);
         let after = editor.finish();
-        assert_eq!((after.census(), after.points().len()), (mesh.census(), 4));
+        assert_eq!((after.topology_summary(), after.points().len()), (mesh.topology_summary(), 4));
         after.assert_sound();
     }
 

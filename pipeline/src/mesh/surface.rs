@@ -1,7 +1,7 @@
 //! A repaired surface.
 
 use super::Metric;
-use crate::topology::{Census, EdgeTable, FaceId, VertexId};
+use crate::topology::{EdgeTable, FaceId, TopologySummary, VertexId};
 use crate::vec3::{BoundingBox, Vec3, triangle_area};
 
 /// A mesh gets at least this many edges along the diagonal of the bounding box, unless another size is asked for: CAD parts
@@ -20,7 +20,7 @@ pub struct SurfaceMesh {
     /// Vertices from this one on are not of the input.
     pub(super) added_from: usize,
     pub(super) edges: EdgeTable,
-    pub(super) census: Census,
+    pub(super) summary: TopologySummary,
     pub(super) metric: Metric,
 }
 
@@ -62,12 +62,12 @@ pub(crate) struct Patch {
 
 impl SurfaceMesh {
     /// A surface of these parts, counted, unless its triangles are `counted` already.
-    pub(crate) fn new(parts: SurfaceParts, sheets: Sheets, counted: Option<Census>) -> Self {
+    pub(crate) fn new(parts: SurfaceParts, sheets: Sheets, counted: Option<TopologySummary>) -> Self {
         let SurfaceParts { points, triangles, source, welded, added_from, edges, metric } = parts;
-        let counted = counted.unwrap_or_else(|| Census::new(&triangles, &edges));
+        let counted = counted.unwrap_or_else(|| TopologySummary::new(&triangles, &edges));
         let Sheets { nonmanifold_edges, nonmanifold_vertices } = sheets;
-        let census = Census { nonmanifold_edges, nonmanifold_vertices, ..counted };
-        Self { points, triangles, source, welded, added_from, edges, census, metric }
+        let summary = TopologySummary { nonmanifold_edges, nonmanifold_vertices, ..counted };
+        Self { points, triangles, source, welded, added_from, edges, summary, metric }
     }
 
     /// Checks what the surface knows of itself against what its triangles tell.
@@ -75,12 +75,16 @@ impl SurfaceMesh {
     pub(crate) fn assert_sound(&self) {
         let edges = EdgeTable::new(&self.triangles);
         assert!(self.edges.iter().eq(edges.iter()), "edges");
-        let Census { nonmanifold_edges, nonmanifold_vertices, .. } = self.census;
-        let anew = Census { nonmanifold_edges, nonmanifold_vertices, ..Census::new(&self.triangles, &edges) };
-        assert_eq!(self.census, anew);
+        let TopologySummary { nonmanifold_edges, nonmanifold_vertices, .. } = self.summary;
+        let anew = TopologySummary {
+            nonmanifold_edges,
+            nonmanifold_vertices,
+            ..TopologySummary::new(&self.triangles, &edges)
+        };
+        assert_eq!(self.summary, anew);
         let faces = self.triangles.len();
         assert_eq!((self.source.len(), self.metric.shapes.len(), self.metric.flagged.len()), (faces, faces, faces));
-        assert_eq!((self.welded.len(), self.census.vertices), (self.points.len(), self.points.len()));
+        assert_eq!((self.welded.len(), self.summary.vertices), (self.points.len(), self.points.len()));
     }
 
     /// The positions of the vertices, in the unit of the input.
@@ -116,8 +120,8 @@ impl SurfaceMesh {
 
     /// The counts after splitting; but `nonmanifold_edges` are those that were split, and `nonmanifold_vertices`
     /// those at which a sheet touches others away from its boundary.
-    pub fn census(&self) -> &Census {
-        &self.census
+    pub fn topology_summary(&self) -> &TopologySummary {
+        &self.summary
     }
 
     /// The intrinsic metric.
@@ -141,7 +145,20 @@ impl SurfaceMesh {
         }
     }
 
-    /// The surface of some faces, ascending, which hold all triangles around each of their edges.
+    /// The same surface, whose sheets met so often.
+    pub(crate) fn of_sheets(mut self, sheets: Sheets) -> Self {
+        self.summary.nonmanifold_edges = sheets.nonmanifold_edges;
+        self.summary.nonmanifold_vertices = sheets.nonmanifold_vertices;
+        self
+    }
+
+    /// Per vertex, the welded vertex that it is a copy of.
+    pub(crate) fn welded(&self) -> &[u32] {
+        &self.welded
+    }
+
+    /// The surface of some faces, ascending, which hold all triangles around each of their edges. Where its sheets met is
+    /// still to be counted ([`Self::of_sheets`]).
     pub(crate) fn restricted(&self, faces: &[FaceId]) -> Self {
         let mut is_used = vec![false; self.points.len()];
         faces.iter().flat_map(|f| self.triangles[f.index()]).for_each(|v| is_used[v.index()] = true);
@@ -162,8 +179,8 @@ impl SurfaceMesh {
     /// A part as a surface of its own.
     pub(crate) fn of_patch(triangles: Vec<[VertexId; 3]>, edges: EdgeTable, metric: Metric, patch: Patch) -> Self {
         let Patch { points, welded, source, added_from, .. } = patch;
-        let census = Census::new(&triangles, &edges);
-        Self { points, triangles, source, welded, added_from, edges, census, metric }
+        let summary = TopologySummary::new(&triangles, &edges);
+        Self { points, triangles, source, welded, added_from, edges, summary, metric }
     }
 
     /// The total true area, in the unit of the input, squared.

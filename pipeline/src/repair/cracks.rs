@@ -56,7 +56,7 @@ pub(super) fn find(points: &[Vec3], triangles: &[[VertexId; 3]], edges: &EdgeTab
 fn join_bundles(rim: &Rim, candidates: &[Candidate], joiner: &mut Joiner) -> usize {
     let mut bundles = UnionFind::new(rim.open.len());
     candidates.iter().for_each(|c| {
-        bundles.unite(c.edges[0], c.edges[1]);
+        bundles.merge(c.edges[0], c.edges[1]);
     });
     let mut has_facing = vec![false; rim.open.len()];
     candidates.iter().filter(|c| c.facing).for_each(|c| has_facing[bundles.find(c.edges[0])] = true);
@@ -68,7 +68,7 @@ fn join_bundles(rim: &Rim, candidates: &[Candidate], joiner: &mut Joiner) -> usi
         let single = has_facing[bundles.find(g)];
         let free = !(single && (taken[g] || taken[h])) && joined.find(g) != joined.find(h);
         if free && joiner.join(c.ends) {
-            joined.unite(g, h);
+            joined.merge(g, h);
             (taken[g], taken[h]) = (true, true);
             pairs += 1;
         }
@@ -99,7 +99,7 @@ fn zip_short_edges(rim: &Rim, joiner: &mut Joiner) -> usize {
     }
 }
 
-/// The open edges of a draft.
+/// The open edges of a builder.
 struct Rim<'a> {
     points: &'a [Vec3],
     triangles: &'a [[VertexId; 3]],
@@ -207,7 +207,7 @@ impl<'a> Joiner<'a> {
     fn join(&mut self, ends: [[VertexId; 2]; 2]) -> bool {
         let allowed = ends.iter().all(|[a, b]| self.may_unite(a.index(), b.index()));
         if allowed {
-            ends.iter().for_each(|[a, b]| self.unite(a.index(), b.index()));
+            ends.iter().for_each(|[a, b]| self.merge(a.index(), b.index()));
         }
         allowed
     }
@@ -223,13 +223,13 @@ impl<'a> Joiner<'a> {
         a == b || !clash
     }
 
-    fn unite(&mut self, a: usize, b: usize) {
+    fn merge(&mut self, a: usize, b: usize) {
         let (a, b) = (self.sets.find(a), self.sets.find(b));
         if a != b {
             let (kept, gone) = (a.min(b), a.max(b));
             let mut moved = std::mem::take(&mut self.faces[gone]);
             self.faces[kept].append(&mut moved);
-            self.sets.unite(a, b);
+            self.sets.merge(a, b);
         }
     }
 }

@@ -9,7 +9,7 @@
 //!    vertices of its own.
 //! 6. Edge lengths are mollified where triangles are degenerate ([`crate::mesh::Metric`]).
 //!
-//! Everything that was found and done is counted, with the first few ids. The census of the result still counts
+//! Everything that was found and done is counted, with the first few ids. The summary of the result still counts
 //! the non-manifold edges that were split, and the vertices at which a sheet touches others away from its
 //! boundary: both have to become seams. What cannot be a surface at all (no triangle is left) is refused, and what nobody
 //! wants charts of ([`Repaired::accepted`]).
@@ -21,7 +21,7 @@ mod t_junctions;
 pub(crate) mod weld;
 
 use crate::mesh::{Metric, Sheets, SurfaceMesh, SurfaceParts, TriangleSoup};
-use crate::topology::{Census, EdgeTable, Umbrellas};
+use crate::topology::{EdgeTable, TopologySummary, VertexFans};
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 use crate::vec3::{BoundingBox, Vec3, midpoint, unit_scale};
 pub use sheets::{Accepted, RefusedComponent};
@@ -45,14 +45,14 @@ impl Default for Settings {
 
 /// A number of things found, and the first few of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Found {
+pub struct Sample {
     /// How many.
     pub count: usize,
     /// The first ids, at most eight: positions in the input file.
     pub first: Vec<u32>,
 }
 
-impl Found {
+impl Sample {
     const SHOWN: usize = 8;
 
     fn push(&mut self, id: u32) {
@@ -77,27 +77,27 @@ pub struct Report {
     /// Points that no triangle uses.
     pub unreferenced_points: usize,
     /// Vertices (after welding) that lay on open edges of other triangles, which were split there.
-    pub t_junctions_closed: Found,
+    pub t_junctions_closed: Sample,
     /// Vertices (after welding) on the boundary that lie on an open edge still.
-    pub t_junctions_left: Found,
+    pub t_junctions_left: Sample,
     /// Triangles of the surface beyond one for each of the input: parts of those that were split.
     pub triangles_added: usize,
     /// Pairs of open edges joined.
     pub cracks_closed: usize,
     /// Copies of a triangle, removed.
-    pub duplicate_triangles: Found,
+    pub duplicate_triangles: Sample,
     /// Triangles with two equal vertices, removed.
-    pub degenerate_triangles: Found,
+    pub degenerate_triangles: Sample,
     /// Triangles turned over.
-    pub flipped_triangles: Found,
+    pub flipped_triangles: Sample,
     /// Single edges along which sheets meet inside a sheet, halved so that they can be seams.
     pub slits_opened: usize,
     /// Vertices (after welding) that were given to several sheets.
-    pub split_vertices: Found,
+    pub split_vertices: Sample,
     /// What was added to every intrinsic edge length, in the unit of the input.
     pub mollified_by: f64,
     /// Triangles whose area mollification changed by more than 1 %.
-    pub mollified_triangles: Found,
+    pub mollified_triangles: Sample,
 }
 
 /// A repaired surface with the account of its repair.
@@ -106,7 +106,7 @@ pub struct Repaired {
     /// The surface.
     pub mesh: SurfaceMesh,
     /// The counts before repair: bit-equal vertices merged, triangles with two equal vertices left out.
-    pub raw: Census,
+    pub raw: TopologySummary,
     /// What was done.
     pub report: Report,
 }
@@ -141,13 +141,13 @@ pub enum Error {
 }
 
 /// Triangles on their way through repair: each with its position in the input.
-struct Draft {
+struct MeshBuilder {
     points: Vec<Vec3>,
     triangles: Vec<[VertexId; 3]>,
     source: Vec<u32>,
 }
 
-/// The points of a draft in a unit in which distances neither overflow nor underflow, and the tolerance in that unit.
+/// The points of a builder in a unit in which distances neither overflow nor underflow, and the tolerance in that unit.
 struct Measure {
     points: Vec<Vec3>,
     tolerance: f64,
@@ -158,42 +158,42 @@ struct Measure {
 /// # Errors
 /// [`Error::OnlyDegenerate`] when nothing is left.
 pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Error> {
-    let (mut draft, welded) = weld::weld(soup);
+    let (mut builder, welded) = weld::weld(soup);
     let mut report = Report { welded, ..Report::default() };
-    let used = draft.count_used();
-    report.degenerate_triangles = draft.drop_degenerate();
-    if draft.triangles.is_empty() {
+    let used = builder.count_used();
+    report.degenerate_triangles = builder.drop_degenerate();
+    if builder.triangles.is_empty() {
         return Err(Error::OnlyDegenerate { triangles: soup.triangles().len() });
     }
-    let mut edges = EdgeTable::new(&draft.triangles);
-    let raw = Census::new(&draft.triangles, &edges);
-    report.unreferenced_points = draft.points.len() - used;
-    report.duplicate_triangles = draft.drop_duplicates();
-    edges = renewed(edges, report.duplicate_triangles.count > 0, &draft.triangles);
-    let measure = draft.measure(settings.weld);
-    report.t_junctions_closed = draft.close_t_junctions(&edges, &measure);
+    let mut edges = EdgeTable::new(&builder.triangles);
+    let raw = TopologySummary::new(&builder.triangles, &edges);
+    report.unreferenced_points = builder.points.len() - used;
+    report.duplicate_triangles = builder.drop_duplicates();
+    edges = renewed(edges, report.duplicate_triangles.count > 0, &builder.triangles);
+    let measure = builder.measure(settings.weld);
+    report.t_junctions_closed = builder.close_t_junctions(&edges, &measure);
     let split = report.t_junctions_closed.count > 0;
-    edges = renewed(edges, split, &draft.triangles);
+    edges = renewed(edges, split, &builder.triangles);
     let copies = report.duplicate_triangles.count;
-    draft.close_cracks(&edges, &measure, &mut report);
+    builder.close_cracks(&edges, &measure, &mut report);
     let changed = report.cracks_closed > 0 || report.duplicate_triangles.count > copies;
-    edges = renewed(edges, changed, &draft.triangles);
-    report.t_junctions_left = draft.t_junctions_left(&edges, &measure);
+    edges = renewed(edges, changed, &builder.triangles);
+    report.t_junctions_left = builder.t_junctions_left(&edges, &measure);
     drop(measure);
     let as_counted = report.duplicate_triangles.count == 0 && report.cracks_closed == 0 && !split;
     if !as_counted || raw.inconsistent_edges > 0 {
-        report.flipped_triangles = draft.orient(&edges);
-        edges = renewed(edges, report.flipped_triangles.count > 0, &draft.triangles);
+        report.flipped_triangles = builder.orient(&edges);
+        edges = renewed(edges, report.flipped_triangles.count > 0, &builder.triangles);
     }
-    let input_points = draft.points.len();
-    report.slits_opened = draft.open_slits(&edges);
+    let input_points = builder.points.len();
+    report.slits_opened = builder.open_slits(&edges);
     let opened = report.slits_opened > 0;
-    edges = renewed(edges, opened, &draft.triangles);
-    report.triangles_added = if split || opened { draft.count_added() } else { 0 };
+    edges = renewed(edges, opened, &builder.triangles);
+    report.triangles_added = if split || opened { builder.count_added() } else { 0 };
     let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0 && !opened);
-    let mesh = draft.into_mesh(edges, input_points, known, &mut report);
+    let mesh = builder.into_mesh(edges, input_points, known, &mut report);
     // As read: vertices of degenerate triangles count, though these do not.
-    Ok(Repaired { mesh, raw: Census { vertices: used, ..raw }, report })
+    Ok(Repaired { mesh, raw: TopologySummary { vertices: used, ..raw }, report })
 }
 
 /// The edges of `triangles`: found again only where the triangles `changed`.
@@ -201,7 +201,7 @@ fn renewed(edges: EdgeTable, changed: bool, triangles: &[[VertexId; 3]]) -> Edge
     if changed { EdgeTable::new(triangles) } else { edges }
 }
 
-impl Draft {
+impl MeshBuilder {
     /// The number of points that triangles use.
     fn count_used(&self) -> usize {
         let mut used = vec![false; self.points.len()];
@@ -218,14 +218,14 @@ impl Draft {
     }
 
     /// Removes triangles with two equal vertices.
-    fn drop_degenerate(&mut self) -> Found {
+    fn drop_degenerate(&mut self) -> Sample {
         let whole = |t: &[VertexId; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
         let keep: Vec<bool> = self.triangles.iter().map(whole).collect();
         self.keep_only(&keep)
     }
 
     /// Removes all but the first of the triangles with the same three vertices.
-    fn drop_duplicates(&mut self) -> Found {
+    fn drop_duplicates(&mut self) -> Sample {
         let mut keyed: Vec<([VertexId; 3], usize)> = self.triangles.iter().copied().zip(0..).collect();
         keyed.iter_mut().for_each(|(t, _)| t.sort_unstable());
         keyed.sort_unstable();
@@ -236,8 +236,8 @@ impl Draft {
         self.keep_only(&keep)
     }
 
-    fn keep_only(&mut self, keep: &[bool]) -> Found {
-        let dropped = Found::of(self.source.iter().zip(keep).filter(|(_, keep)| !**keep).map(|(s, _)| *s));
+    fn keep_only(&mut self, keep: &[bool]) -> Sample {
+        let dropped = Sample::of(self.source.iter().zip(keep).filter(|(_, keep)| !**keep).map(|(s, _)| *s));
         let mut flags = keep.iter();
         self.triangles.retain(|_| flags.next() == Some(&true));
         let mut flags = keep.iter();
@@ -255,7 +255,7 @@ impl Draft {
     }
 
     /// Splits triangles where vertices of others lie on their open edges; returns these vertices.
-    fn close_t_junctions(&mut self, edges: &EdgeTable, measure: &Measure) -> Found {
+    fn close_t_junctions(&mut self, edges: &EdgeTable, measure: &Measure) -> Sample {
         let splits = Boundary::new(&measure.points, &self.triangles, edges, measure.tolerance).splits();
         let mut closed: Vec<VertexId> = splits.iter().flat_map(|s| s.1.iter().copied()).collect();
         closed.sort_unstable();
@@ -265,7 +265,7 @@ impl Draft {
             of_face.iter().for_each(|(h, vertices)| on_sides[h.side()].clone_from(vertices));
             self.split(of_face[0].0.face().index(), &on_sides);
         }
-        Found::of(closed.into_iter().map(|v| v.0))
+        Sample::of(closed.into_iter().map(|v| v.0))
     }
 
     /// Halves the non-manifold edges along which two triangles would stay neighbours after the split; returns how many.
@@ -278,9 +278,9 @@ impl Draft {
         if !edges.iter().any(|(_, sides)| meets(sides)) {
             return 0;
         }
-        let umbrellas = Umbrellas::new(&self.triangles, edges);
+        let fans = VertexFans::new(&self.triangles, edges);
         let ends = |h: &HalfEdgeId| {
-            let [a, b] = [h.index(), h.next().index()].map(|corner| umbrellas.of_corner[corner]);
+            let [a, b] = [h.index(), h.next().index()].map(|corner| fans.of_corner[corner]);
             [a.min(b), a.max(b)]
         };
         let rejoined = |sides: &[HalfEdgeId]| {
@@ -316,9 +316,9 @@ impl Draft {
     }
 
     /// The boundary vertices that lie on a boundary edge.
-    fn t_junctions_left(&self, edges: &EdgeTable, measure: &Measure) -> Found {
+    fn t_junctions_left(&self, edges: &EdgeTable, measure: &Measure) -> Sample {
         let left = Boundary::new(&measure.points, &self.triangles, edges, measure.tolerance).vertices_on_edges();
-        Found::of(left.into_iter().map(|v| v.0))
+        Sample::of(left.into_iter().map(|v| v.0))
     }
 
     /// Joins open edges within the tolerance of each other, then drops what became a copy.
@@ -333,7 +333,7 @@ impl Draft {
         let copies = self.drop_duplicates();
         report.duplicate_triangles.count += copies.count;
         report.duplicate_triangles.first.extend(copies.first);
-        report.duplicate_triangles.first.truncate(Found::SHOWN);
+        report.duplicate_triangles.first.truncate(Sample::SHOWN);
     }
 
     fn used_points(&self) -> impl Iterator<Item = Vec3> {
@@ -341,7 +341,7 @@ impl Draft {
     }
 
     /// Orients each orientable component like the majority of its triangles (the first one, in a tie).
-    fn orient(&mut self, edges: &EdgeTable) -> Found {
+    fn orient(&mut self, edges: &EdgeTable) -> Sample {
         let found = crate::topology::orientation(&self.triangles, edges);
         let mut balance = vec![0_i64; found.orientable.len()];
         for (c, flip) in found.component.iter().zip(&found.flip) {
@@ -349,7 +349,7 @@ impl Draft {
         }
         let turn = |(flip, c): (&bool, &u32)| found.orientable[*c as usize] && *flip != (balance[*c as usize] < 0);
         let turned = found.flip.iter().zip(&found.component).map(turn);
-        let mut flipped = Found::default();
+        let mut flipped = Sample::default();
         for (face, turn) in turned.enumerate() {
             if turn {
                 self.triangles[face].swap(1, 2);
@@ -359,18 +359,18 @@ impl Draft {
         flipped
     }
 
-    /// Gives every umbrella a vertex of its own, drops unused points, and measures. The triangles may have been counted
+    /// Gives every fan a vertex of its own, drops unused points, and measures. The triangles may have been counted
     /// before. Points from `input_points` on are not of the input.
     fn into_mesh(
         self,
         edges: EdgeTable,
         input_points: usize,
-        known: Option<&Census>,
+        known: Option<&TopologySummary>,
         report: &mut Report,
     ) -> SurfaceMesh {
-        let umbrellas = Umbrellas::new(&self.triangles, &edges);
-        let (of_umbrella, welded) = split_vertices(&umbrellas.vertices(&self.triangles), report);
-        let renamed = |face: usize| [0, 1, 2].map(|k| of_umbrella[umbrellas.of_corner[3 * face + k] as usize]);
+        let fans = VertexFans::new(&self.triangles, &edges);
+        let (of_fan, welded) = split_vertices(&fans.vertices(&self.triangles), report);
+        let renamed = |face: usize| [0, 1, 2].map(|k| of_fan[fans.of_corner[3 * face + k] as usize]);
         let triangles: Vec<_> = (0..self.triangles.len()).map(renamed).collect();
         let points: Vec<Vec3> = welded.iter().map(|w| self.points[*w as usize]).collect();
         let corners: Vec<_> = triangles.iter().map(|t| t.map(|v: VertexId| points[v.index()])).collect();
@@ -378,7 +378,7 @@ impl Draft {
         let metric = Metric::new(&corners, unit_scale(diagonal));
         report.mollified_by = metric.mollified_by / metric.scale;
         report.mollified_triangles =
-            Found::of((0..corners.len()).filter(|f| metric.flagged[*f]).map(|f| self.source[f]));
+            Sample::of((0..corners.len()).filter(|f| metric.flagged[*f]).map(|f| self.source[f]));
         // Splitting makes every sheet manifold; what was split is still told, as it must become a seam.
         let nonmanifold_edges = edges.iter().filter(|(_, sides)| sides.len() > 2).count();
         let edges = renewed(edges, report.split_vertices.count > 0, &triangles);
@@ -390,20 +390,20 @@ impl Draft {
     }
 }
 
-/// One vertex per umbrella, in ascending order of the vertices they come from: per umbrella its vertex, and per
+/// One vertex per fan, in ascending order of the vertices they come from: per fan its vertex, and per
 /// vertex the welded point it is a copy of.
-fn split_vertices(umbrella_vertices: &[VertexId], report: &mut Report) -> (Vec<VertexId>, Vec<u32>) {
-    let mut order: Vec<(VertexId, usize)> = umbrella_vertices.iter().copied().zip(0..).collect();
+fn split_vertices(fan_vertices: &[VertexId], report: &mut Report) -> (Vec<VertexId>, Vec<u32>) {
+    let mut order: Vec<(VertexId, usize)> = fan_vertices.iter().copied().zip(0..).collect();
     order.sort_unstable();
-    let mut of_umbrella = vec![VertexId(0); order.len()];
+    let mut of_fan = vec![VertexId(0); order.len()];
     let welded = order.iter().map(|(v, _)| v.0).collect();
-    for (new, (_, umbrella)) in order.iter().enumerate() {
-        of_umbrella[*umbrella] = VertexId::at(new);
+    for (new, (_, fan)) in order.iter().enumerate() {
+        of_fan[*fan] = VertexId::at(new);
     }
     for copies in order.chunk_by(|a, b| a.0 == b.0).filter(|c| c.len() > 1) {
         report.split_vertices.push(copies[0].0.0);
     }
-    (of_umbrella, welded)
+    (of_fan, welded)
 }
 
 /// Vertices at which sheets touch, one of them not at its boundary: no boundary loop passes through them there.

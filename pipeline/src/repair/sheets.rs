@@ -4,8 +4,8 @@
 //! A file may hold such faces beside a surface. So each *component* is judged: what is connected through edges, also those of
 //! three and more triangles. Of those with the most sheets so many are refused that the rest is few enough.
 
-use super::{Error, Repaired};
-use crate::mesh::SurfaceMesh;
+use super::{Error, Repaired, pinned_vertices};
+use crate::mesh::{Sheets, SurfaceMesh};
 use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 use std::collections::BTreeSet;
@@ -61,37 +61,42 @@ impl Repaired {
     /// # Errors
     /// [`Error::VolumeElements`], where no other is left.
     pub fn accepted(self) -> Result<Accepted, Error> {
-        let Judged { kept, refused } = self.judged()?;
-        let mesh = match kept {
-            None => self.mesh,
-            Some(kept) => self.mesh.restricted(&kept),
-        };
-        Ok(Accepted { mesh, refused })
+        let Judged { kept, nonmanifold_edges, refused } = self.judged()?;
+        let Some(kept) = kept else { return Ok(Accepted { mesh: self.mesh, refused }) };
+        let mesh = self.mesh.restricted(&kept);
+        let nonmanifold_vertices = pinned_vertices(mesh.welded(), mesh.triangles(), mesh.edges());
+        Ok(Accepted { mesh: mesh.of_sheets(Sheets { nonmanifold_edges, nonmanifold_vertices }), refused })
     }
 
     fn judged(&self) -> Result<Judged, Error> {
-        let census = self.mesh.census();
-        let sheets = census.components.saturating_sub(self.raw.components);
-        if !are_too_many(sheets, census.triangles) {
-            return Ok(Judged { kept: None, refused: vec![] });
+        let summary = self.mesh.topology_summary();
+        let sheets = summary.components.saturating_sub(self.raw.components);
+        if !are_too_many(sheets, summary.triangles) {
+            let nonmanifold_edges = summary.nonmanifold_edges;
+            return Ok(Judged { kept: None, nonmanifold_edges, refused: vec![] });
         }
         let components = Components::new(&self.mesh);
         let refused = components.refused();
         if refused.len() == components.all.len() {
             let vertices = self.report.split_vertices.first.clone();
-            let (triangles, nonmanifold_edges) = (census.triangles, census.nonmanifold_edges);
+            let (triangles, nonmanifold_edges) = (summary.triangles, summary.nonmanifold_edges);
             return Err(Error::VolumeElements { sheets, triangles, nonmanifold_edges, vertices });
         }
         let is_kept = |f: &usize| !refused.contains(&components.of_face[*f]);
         let kept = (0..components.of_face.len()).filter(is_kept).map(FaceId::at).collect();
+        let is_kept = |(number, _): &(usize, &Component)| !refused.contains(number);
+        let nonmanifold_edges =
+            components.all.iter().enumerate().filter(is_kept).map(|(_, c)| c.nonmanifold_edges).sum();
         let refused = refused.iter().map(|number| components.refusal(*number, &self.mesh)).collect();
-        Ok(Judged { kept: Some(kept), refused })
+        Ok(Judged { kept: Some(kept), nonmanifold_edges, refused })
     }
 }
 
 /// Which faces are worth an atlas (all, where none are named), and which components are not.
 struct Judged {
     kept: Option<Vec<FaceId>>,
+    /// Edges at which sheets of what is kept met.
+    nonmanifold_edges: usize,
     refused: Vec<RefusedComponent>,
 }
 
@@ -123,7 +128,7 @@ impl Components {
         let mut connected = UnionFind::new(mesh.triangles().len());
         for (_, sides) in mesh.edges().iter() {
             for pair in sides.windows(2) {
-                connected.unite(pair[0].face().index(), pair[1].face().index());
+                connected.merge(pair[0].face().index(), pair[1].face().index());
             }
         }
         let (sheet_of, sheets) = connected.labels();
@@ -131,7 +136,7 @@ impl Components {
         let met = met_edges(mesh);
         for sides in &met {
             for pair in sides.windows(2) {
-                connected.unite(pair[0].face().index(), pair[1].face().index());
+                connected.merge(pair[0].face().index(), pair[1].face().index());
             }
         }
         let (component_of, count) = connected.labels();

@@ -21,16 +21,16 @@ fn bit_equal_vertices_are_merged_whatever_the_sign_of_zero() {
     let soup = TriangleSoup::new(points, vec![[0, 1, 2], [3, 4, 5]]).expect("sound");
     let got = repaired(&soup);
     assert_eq!((got.report.welded, got.raw.vertices, got.raw.boundary_loops), (2, 4, 1));
-    assert!(got.mesh.census().is_one_chart());
+    assert!(got.mesh.topology_summary().is_one_chart());
 }
 
 #[test]
 fn cracks_within_the_tolerance_are_closed_and_wider_ones_are_not() {
     let narrow = repaired(&cracked_square([3e-7, 0.0, 4e-7]));
     assert_eq!((narrow.raw.components, narrow.report.cracks_closed), (2, 1));
-    assert!(narrow.mesh.census().is_one_chart());
+    assert!(narrow.mesh.topology_summary().is_one_chart());
     let wide = repaired(&cracked_square([3e-5, 0.0, 4e-5]));
-    assert_eq!((wide.report.cracks_closed, wide.mesh.census().components), (0, 2));
+    assert_eq!((wide.report.cracks_closed, wide.mesh.topology_summary().components), (0, 2));
     let off = repair(&cracked_square([3e-7, 0.0, 4e-7]), &Settings { weld: 0.0 }).expect("a surface is left");
     assert_eq!(off.report.cracks_closed, 0);
 }
@@ -41,7 +41,7 @@ fn the_walls_of_a_thin_gap_stay_apart() {
     let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, gap], [1.0, 0.0, gap], [0.0, 1.0, gap]];
     let soup = TriangleSoup::new(points, vec![[0, 1, 2], [3, 5, 4]]).expect("sound");
     let got = repaired(&soup);
-    assert_eq!((got.report.cracks_closed, got.mesh.census().components), (0, 2));
+    assert_eq!((got.report.cracks_closed, got.mesh.topology_summary().components), (0, 2));
 }
 
 #[test]
@@ -60,8 +60,8 @@ fn copies_and_degenerate_triangles_go_and_are_named() {
     let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
     let soup = TriangleSoup::new(points, vec![[0, 1, 2], [1, 1, 2], [2, 1, 0], [1, 3, 2]]).expect("sound");
     let got = repaired(&soup);
-    assert_eq!(got.report.degenerate_triangles, Found { count: 1, first: vec![1] });
-    assert_eq!(got.report.duplicate_triangles, Found { count: 1, first: vec![2] });
+    assert_eq!(got.report.degenerate_triangles, Sample { count: 1, first: vec![1] });
+    assert_eq!(got.report.duplicate_triangles, Sample { count: 1, first: vec![2] });
     assert_eq!([0, 1].map(|f| got.mesh.source_triangle(f)), [0, 3]);
 }
 
@@ -76,7 +76,7 @@ fn the_majority_decides_the_orientation() {
     soup = TriangleSoup::new(soup.points().to_vec(), triangles).expect("sound");
     let got = repaired(&soup);
     assert_eq!((got.report.flipped_triangles.count, got.report.flipped_triangles.first[0]), (turned, 3));
-    assert_eq!(got.mesh.census().inconsistent_edges, 0);
+    assert_eq!(got.mesh.topology_summary().inconsistent_edges, 0);
     assert!(got.raw.inconsistent_edges > 0);
 }
 
@@ -84,8 +84,8 @@ fn the_majority_decides_the_orientation() {
 fn sheets_that_touch_get_their_own_vertices() {
     let got = repaired(&shapes::bow_tie());
     assert_eq!(got.report.split_vertices.count, 1);
-    let census = got.mesh.census();
-    assert_eq!((census.components, census.nonmanifold_vertices), (2, 0));
+    let summary = got.mesh.topology_summary();
+    assert_eq!((summary.components, summary.nonmanifold_vertices), (2, 0));
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn repair_does_not_depend_on_units() {
         let soup = shapes::cracked_patch();
         let points = soup.points().iter().map(|p| p.map(|c| c * scale)).collect();
         let got = repaired(&TriangleSoup::new(points, soup.triangles().to_vec()).expect("sound"));
-        assert!(got.report.cracks_closed > 0 && got.mesh.census().is_one_chart(), "scale {scale}");
+        assert!(got.report.cracks_closed > 0 && got.mesh.topology_summary().is_one_chart(), "scale {scale}");
     }
 }
 
@@ -109,9 +109,9 @@ fn sheets_are_split_along_non_manifold_edges_which_are_still_told() {
     let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
     let soup = TriangleSoup::new(points, vec![[0, 1, 2], [1, 0, 3], [0, 1, 4]]).expect("sound");
     let got = repaired(&soup);
-    let census = got.mesh.census();
-    assert_eq!((census.nonmanifold_edges, census.components, got.report.split_vertices.count), (1, 3, 2));
-    assert!(!census.is_one_chart());
+    let summary = got.mesh.topology_summary();
+    assert_eq!((summary.nonmanifold_edges, summary.components, got.report.split_vertices.count), (1, 3, 2));
+    assert!(!summary.is_one_chart());
 }
 
 #[test]
@@ -123,14 +123,18 @@ fn a_vertex_pinned_to_the_inside_of_a_sheet_is_told() {
     let mut triangles = disk.triangles().to_vec();
     triangles.push([0, 7, 8]);
     let got = repaired(&TriangleSoup::new(points, triangles).expect("sound"));
-    assert_eq!((got.mesh.census().nonmanifold_vertices, got.mesh.census().components), (1, 2));
-    assert_eq!(repaired(&shapes::bow_tie()).mesh.census().nonmanifold_vertices, 0, "both sheets at their boundary");
+    assert_eq!((got.mesh.topology_summary().nonmanifold_vertices, got.mesh.topology_summary().components), (1, 2));
+    assert_eq!(
+        repaired(&shapes::bow_tie()).mesh.topology_summary().nonmanifold_vertices,
+        0,
+        "both sheets at their boundary"
+    );
 }
 
 #[test]
 fn what_cannot_be_oriented_is_left_as_it_is() {
     let got = repaired(&shapes::moebius(9));
-    assert_eq!((got.report.flipped_triangles.count, got.mesh.census().orientable), (0, false));
+    assert_eq!((got.report.flipped_triangles.count, got.mesh.topology_summary().orientable), (0, false));
 }
 
 /// Sheets of n squares that meet in the line x = y = 0, each with its own noise.
@@ -154,18 +158,18 @@ fn sheets(directions: &[[f64; 2]], n: u32, noise: f64) -> TriangleSoup {
 fn where_three_sheets_meet_noise_decides_nothing() {
     for noise in [0.0, 1e-8, 1e-7, 2e-7] {
         let got = repaired(&sheets(&[[1.0, 0.0], [-1.0, 0.2], [0.0, 1.0]], 8, noise));
-        let census = got.mesh.census();
-        assert_eq!((census.nonmanifold_edges, census.components), (8, 3), "noise {noise}");
-        assert!(!census.is_one_chart());
+        let summary = got.mesh.topology_summary();
+        assert_eq!((summary.nonmanifold_edges, summary.components), (8, 3), "noise {noise}");
+        assert!(!summary.is_one_chart());
     }
 }
 
 #[test]
 fn two_sheets_become_one_and_walls_beside_them_stay() {
     let two = repaired(&sheets(&[[1.0, 0.0], [-1.0, 0.3]], 8, 2e-7));
-    assert!(two.report.cracks_closed == 8 && two.mesh.census().is_one_chart());
+    assert!(two.report.cracks_closed == 8 && two.mesh.topology_summary().is_one_chart());
     let folded = repaired(&sheets(&[[1.0, 0.0], [1.0, 0.01]], 8, 2e-7));
-    assert_eq!((folded.report.cracks_closed, folded.mesh.census().components), (0, 2));
+    assert_eq!((folded.report.cracks_closed, folded.mesh.topology_summary().components), (0, 2));
 }
 
 #[test]
@@ -183,7 +187,12 @@ fn chains_of_edges_shorter_than_the_tolerance_are_zipped_up() {
         }
     }
     let got = repaired(&TriangleSoup::new(points, triangles).expect("sound"));
-    assert_eq!((got.mesh.census().boundary_loops, got.mesh.census().components), (1, 1), "{:?}", got.report);
+    assert_eq!(
+        (got.mesh.topology_summary().boundary_loops, got.mesh.topology_summary().components),
+        (1, 1),
+        "{:?}",
+        got.report
+    );
 }
 
 #[test]
@@ -234,11 +243,11 @@ fn vertices_on_the_edge_of_another_side_split_it() {
         let soup = square_and_fine_side(&heights, noise);
         let got = repair(&soup, &Settings { weld }).expect("a surface");
         assert_eq!((got.report.t_junctions_closed.count, got.report.t_junctions_left.count), (4, 0), "{noise} {weld}");
-        let census = got.mesh.census();
-        assert!(census.is_one_chart() && census.boundary_loops == 1, "{census:?}");
-        assert_eq!((census.triangles, got.report.triangles_added), (2 + 5 + 4, 4));
+        let summary = got.mesh.topology_summary();
+        assert!(summary.is_one_chart() && summary.boundary_loops == 1, "{summary:?}");
+        assert_eq!((summary.triangles, got.report.triangles_added), (2 + 5 + 4, 4));
         assert!((got.mesh.area() - 1.5).abs() < 1e-5);
-        let parts = (0..census.triangles).filter(|f| got.mesh.source_triangle(*f) == 0).count();
+        let parts = (0..summary.triangles).filter(|f| got.mesh.source_triangle(*f) == 0).count();
         assert_eq!(parts, 5, "the first triangle has the edge x = 1");
     }
 }
@@ -247,7 +256,7 @@ fn vertices_on_the_edge_of_another_side_split_it() {
 fn vertices_beside_an_edge_farther_than_the_tolerance_leave_it() {
     for (noise, weld) in [(1e-4, 1e-6), (5e-7, 0.0)] {
         let got = repair(&square_and_fine_side(&[0.0, 0.3, 0.7, 1.0], noise), &Settings { weld }).expect("a surface");
-        assert_eq!((got.report.t_junctions_closed.count, got.mesh.census().components), (0, 2));
+        assert_eq!((got.report.t_junctions_closed.count, got.mesh.topology_summary().components), (0, 2));
     }
 }
 
@@ -257,7 +266,7 @@ fn both_sides_may_have_vertices_on_the_edges_of_the_other() {
     let right = vec![[2.0, 0.5, 0.0], [1.0, 1.1, 0.0], [1.0, 0.6, 0.0], [1.0, 0.1, 0.0]];
     let got = repaired(&fans(&[left, right]));
     assert_eq!(got.report.t_junctions_closed.count, 4);
-    assert!(got.mesh.census().is_one_chart(), "{:?}", got.mesh.census());
+    assert!(got.mesh.topology_summary().is_one_chart(), "{:?}", got.mesh.topology_summary());
 }
 
 #[test]
@@ -272,8 +281,8 @@ fn a_triangle_is_split_on_all_of_its_sides() {
     }
     let got = repaired(&fans(&polygons));
     assert_eq!((got.report.t_junctions_closed.count, got.report.t_junctions_left.count), (9, 0));
-    assert!(got.mesh.census().is_one_chart() && got.mesh.census().boundary_loops == 1);
-    assert_eq!(got.mesh.census().triangles, 12 + 10);
+    assert!(got.mesh.topology_summary().is_one_chart() && got.mesh.topology_summary().boundary_loops == 1);
+    assert_eq!(got.mesh.topology_summary().triangles, 12 + 10);
 }
 
 #[test]
@@ -286,7 +295,12 @@ fn three_sides_cut_differently_meet_in_non_manifold_edges() {
     let pages =
         [page(1.0, 0.0, &[0.0, 1.0]), page(-1.0, 0.2, &[0.0, 0.25, 0.5, 1.0]), page(0.0, 1.0, &[0.0, 0.5, 0.75, 1.0])];
     let got = repaired(&fans(&pages));
-    assert_eq!((got.mesh.census().nonmanifold_edges, got.report.t_junctions_left.count), (4, 0), "{:?}", got.report);
+    assert_eq!(
+        (got.mesh.topology_summary().nonmanifold_edges, got.report.t_junctions_left.count),
+        (4, 0),
+        "{:?}",
+        got.report
+    );
     assert_eq!(got.report.t_junctions_closed.count, 3);
 }
 
@@ -297,7 +311,7 @@ fn walls_of_a_thin_gap_are_not_joined_at_t_junctions_but_told() {
         let lower =
             vec![[0.1, 0.9, 0.0], [0.0, 0.9, 0.0], [0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.6, 0.0, 0.0], [1.0, 0.0, 0.0]];
         let got = repaired(&fans(&[upper, lower]));
-        assert_eq!((got.report.t_junctions_closed.count, got.mesh.census().components), (0, 2), "gap {gap}");
+        assert_eq!((got.report.t_junctions_closed.count, got.mesh.topology_summary().components), (0, 2), "gap {gap}");
         assert!(got.report.t_junctions_left.count >= 2, "{:?}", got.report);
     }
 }
@@ -315,13 +329,13 @@ fn many_vertices_on_one_edge_and_many_long_edges_over_a_rim_cost_little() {
     let heights: Vec<f64> = (0..=n).map(|i| f64::from(i) / f64::from(n)).collect();
     let got = repaired(&square_and_fine_side(&heights, 0.0));
     assert_eq!(got.report.t_junctions_closed.count, n as usize - 1);
-    assert!(got.mesh.census().is_one_chart());
+    assert!(got.mesh.topology_summary().is_one_chart());
     // Many long edges along a fine rim and each other: nobody can tell which belong together.
     let mut polygons = vec![vec![[2.0, 0.5, 0.0]]];
     polygons[0].extend(heights.iter().map(|y| [1.0, *y, 0.0]));
     let beyond = |i: i32| 1e-4 * f64::from(i);
     polygons.extend((1..n).map(beyond).map(|d| vec![[0.0, 0.0, d], [1.0, -d, 0.0], [1.0, 1.0 + 3.0 * d, 0.0]]));
-    assert!(repaired(&fans(&polygons)).mesh.census().triangles > 2 * n as usize - 2);
+    assert!(repaired(&fans(&polygons)).mesh.topology_summary().triangles > 2 * n as usize - 2);
 }
 
 #[test]
@@ -329,9 +343,9 @@ fn a_fine_rim_between_two_walls_does_not_join_them() {
     let wall = |z: f64| vec![[0.0, 0.5, z], [1.0, 0.0, z], [1.0, 1.0, z]];
     let rim = vec![[2.0, 0.5, 0.0], [1.0, 1.0, 0.0], [1.0, 0.6, 0.0], [1.0, 0.3, 0.0], [1.0, 0.0, 0.0]];
     let got = repaired(&fans(&[wall(2e-7), wall(-2e-7), rim.clone()]));
-    assert_eq!((got.report.t_junctions_closed.count, got.mesh.census().nonmanifold_edges), (0, 0));
+    assert_eq!((got.report.t_junctions_closed.count, got.mesh.topology_summary().nonmanifold_edges), (0, 0));
     assert_eq!(got.report.t_junctions_left.count, 2);
-    assert!(repaired(&fans(&[wall(2e-7), rim])).mesh.census().is_one_chart());
+    assert!(repaired(&fans(&[wall(2e-7), rim])).mesh.topology_summary().is_one_chart());
 }
 
 /// The faces of all tetrahedra in a grid of n cubes each way, six in each (Kuhn's).
@@ -380,7 +394,7 @@ fn components_of_volume_elements_are_refused_alone() {
     let (sphere, volume, book) = (shapes::sphere(8), faces_of_tetrahedra(8), shapes::book(3, 4));
     let [of_sphere, of_volume] = [&sphere, &volume].map(|s| s.triangles().len());
     let mixed = repaired(&side_by_side(&[sphere, volume, book.clone()]));
-    let census = mixed.mesh.census().clone();
+    let census = mixed.mesh.topology_summary().clone();
     let Accepted { mesh, refused } = mixed.accepted().expect("a sphere and a book");
     let [RefusedComponent { component: 1, triangles, first_triangle, error }] = &refused[..] else {
         panic!("{refused:?}")
@@ -388,10 +402,13 @@ fn components_of_volume_elements_are_refused_alone() {
     assert_eq!((*triangles, *first_triangle as usize), (of_volume, of_sphere));
     let Error::VolumeElements { sheets, nonmanifold_edges, vertices, .. } = error else { panic!("{error}") };
     assert!(*sheets > 1_000 && vertices.len() == 8, "{error}");
-    let of_book = repaired(&book).mesh.census().clone();
+    let of_book = repaired(&book).mesh.topology_summary().clone();
     assert_eq!(nonmanifold_edges + of_book.nonmanifold_edges, census.nonmanifold_edges);
     // What is left is what it was.
-    assert_eq!(mesh.census().components, 1 + of_book.components);
+    mesh.assert_sound();
+    let met = |s: &TopologySummary| (s.nonmanifold_edges, s.nonmanifold_vertices);
+    assert_eq!(met(mesh.topology_summary()), met(&of_book), "the sphere has none");
+    assert_eq!(mesh.topology_summary().components, 1 + of_book.components);
     assert_eq!(mesh.triangles().len(), of_sphere + of_book.triangles);
     let last = mesh.triangles().len() - 1;
     assert_eq!(mesh.source_triangle(last) as usize, of_sphere + of_volume + of_book.triangles - 1);
@@ -410,8 +427,8 @@ fn a_single_edge_on_which_another_sheet_stands_becomes_a_slit() {
     let got = repaired(&TriangleSoup::new(points, triangles).expect("sound"));
     assert_eq!((got.report.slits_opened, got.report.triangles_added), (1, 3));
     // The slit is a hole of the sheet, along which the fin stands; all three have vertices of their own.
-    let census = got.mesh.census();
-    assert_eq!((census.components, census.boundary_loops, census.nonmanifold_edges), (2, 3, 2));
+    let summary = got.mesh.topology_summary();
+    assert_eq!((summary.components, summary.boundary_loops, summary.nonmanifold_edges), (2, 3, 2));
     let added: Vec<VertexId> =
         (0..got.mesh.points().len()).map(VertexId::at).filter(|v| got.mesh.input_vertex(*v).is_none()).collect();
     assert_eq!(added.len(), 3, "one for each side of the slit, one for the fin");

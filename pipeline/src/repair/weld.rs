@@ -1,6 +1,6 @@
 //! Merging bit-equal vertices.
 
-use super::Draft;
+use super::MeshBuilder;
 use crate::mesh::TriangleSoup;
 use crate::topology::VertexId;
 use crate::vec3::{Vec3, bits_of};
@@ -11,14 +11,14 @@ const LOOKS: usize = 8;
 /// In tables: no point.
 const NONE: u32 = u32::MAX;
 
-/// Merges points with equal coordinates (0 and -0 are equal); returns the draft and how many points were merged
+/// Merges points with equal coordinates (0 and -0 are equal); returns the builder and how many points were merged
 /// away. Vertices are numbered in the order of their first appearance among the points.
-pub(super) fn weld(soup: &TriangleSoup) -> (Draft, usize) {
+pub(super) fn weld(soup: &TriangleSoup) -> (MeshBuilder, usize) {
     let (number, points) = distinct(soup.points());
     let merged = number.len() - points.len();
     let triangles: Vec<_> = soup.triangles().iter().map(|t| t.map(|i| number[i as usize])).collect();
     let source = (0..triangles.len() as u32).collect();
-    (Draft { points, triangles, source }, merged)
+    (MeshBuilder { points, triangles, source }, merged)
 }
 
 /// Per point the number of the one that stands for all with equal coordinates (0 and -0 are equal), and these, in the order

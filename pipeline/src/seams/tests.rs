@@ -61,7 +61,7 @@ fn verify_side(mesh: &SurfaceMesh, chart: &Chart, curve: &Curve, side: &CurveSid
 /// The passages of a loop, put together, are the loop.
 fn verify_loops(chart: &Chart, loops: &[Vec<HalfEdgeId>], network: &SeamNetwork) {
     assert_eq!(network.loops(chart.id()).len(), loops.len());
-    for (turn, passages) in loops.iter().zip(network.loops(chart.id())) {
+    for (boundary_loop, passages) in loops.iter().zip(network.loops(chart.id())) {
         let mut walked = Vec::new();
         for (i, p) in passages.iter().enumerate() {
             let curve = &network.curves()[p.curve.index()];
@@ -75,9 +75,9 @@ fn verify_loops(chart: &Chart, loops: &[Vec<HalfEdgeId>], network: &SeamNetwork)
             }
             walked.extend(half_edges);
         }
-        let start = walked.iter().position(|h| *h == turn[0]).expect("on the loop");
+        let start = walked.iter().position(|h| *h == boundary_loop[0]).expect("on the loop");
         walked.rotate_left(start);
-        assert_eq!(&walked, turn);
+        assert_eq!(&walked, boundary_loop);
     }
 }
 

@@ -34,7 +34,7 @@ impl Invariants {
             let mut used = vec![false; vertices];
             let chosen = ends.iter().zip(edges.iter()).filter(|(_, (_, sides))| admit(sides.len()));
             for (&[a, b], _) in chosen {
-                sets.unite(a.index(), b.index());
+                sets.merge(a.index(), b.index());
                 (used[a.index()], used[b.index()]) = (true, true);
             }
             let roots = (0..vertices).filter(|v| used[*v] && sets.find(*v) == *v).count();

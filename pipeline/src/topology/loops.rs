@@ -125,9 +125,9 @@ mod tests {
 
     #[test]
     fn edges_that_run_out_are_no_loop() {
-        let mut out = vec![Some(1), Some(2), None, Some(3)];
+        let mut out = [Some(1), Some(2), None, Some(3)];
         assert_eq!(closed_loops([3, 0], |n: usize| out[n].take().map(|to| (n, to))), Err(2));
-        let mut out = vec![Some(1), Some(2), Some(0), Some(3)];
+        let mut out = [Some(1), Some(2), Some(0), Some(3)];
         let found = closed_loops([1, 0, 3], |n: usize| out[n].take().map(|to| (n, to)));
         assert_eq!(found, Ok(vec![vec![1, 2, 0], vec![3]]));
     }

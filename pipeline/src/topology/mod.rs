@@ -4,7 +4,6 @@
 //! triangulations alike: typed ids, the edges of a triangulation, the stars of its vertices, sheets and counts, and the
 //! containers that such walks need.
 
-mod census;
 pub(crate) mod csr;
 pub(crate) mod dijkstra;
 mod edges;
@@ -12,12 +11,13 @@ mod id;
 pub(crate) mod loops;
 pub(crate) mod partition;
 mod stars;
+mod summary;
 pub(crate) mod union_find;
 mod visits;
 
-pub use census::{Census, Umbrellas};
-pub(crate) use census::{count_components, orientation};
 pub use edges::EdgeTable;
 pub use id::{ChartId, CurveId, EdgeId, FaceId, HalfEdgeId, VertexId};
 pub use stars::Stars;
+pub use summary::{TopologySummary, VertexFans};
+pub(crate) use summary::{count_components, orientation};
 pub(crate) use visits::VisitStamps;

@@ -24,7 +24,7 @@ impl UnionFind {
     }
 
     /// Unites the sets of `a` and `b`; whether they were apart.
-    pub fn unite(&mut self, a: usize, b: usize) -> bool {
+    pub fn merge(&mut self, a: usize, b: usize) -> bool {
         let (a, b) = (self.find(a), self.find(b));
         let (low, high) = (a.min(b), a.max(b));
         self.parent[high] = low as u32;
@@ -56,9 +56,9 @@ mod tests {
     #[test]
     fn labels_follow_least_members() {
         let mut sets = UnionFind::new(6);
-        assert!(sets.unite(5, 1));
-        assert!(sets.unite(4, 5));
-        assert!(!sets.unite(1, 4));
+        assert!(sets.merge(5, 1));
+        assert!(sets.merge(4, 5));
+        assert!(!sets.merge(1, 4));
         assert_eq!(sets.labels(), (vec![0, 1, 2, 3, 1, 1], 4));
     }
 }

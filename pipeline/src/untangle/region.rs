@@ -47,8 +47,8 @@ fn components(chart: &FilledChart, faces: Vec<u32>) -> Vec<Vec<u32>> {
     let mut sets = UnionFind::new(chart.vertex_count());
     for f in &faces {
         let [a, b, c] = chart.triangles()[*f as usize].map(|v| v.index());
-        sets.unite(a, b);
-        sets.unite(b, c);
+        sets.merge(a, b);
+        sets.merge(b, c);
     }
     let mut keyed: Vec<(usize, u32)> =
         faces.iter().map(|f| (sets.find(chart.triangles()[*f as usize][0].index()), *f)).collect();

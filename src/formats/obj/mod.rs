@@ -278,7 +278,7 @@ mod tests {
         let soup = soup.expect("two groups");
         assert_eq!(soup.triangles().len(), 2);
         let mesh = planish_core::repair(&soup, &Default::default()).expect("a surface").mesh;
-        assert_eq!((mesh.census().vertices, mesh.census().components), (4, 1), "welded again");
+        assert_eq!((mesh.topology_summary().vertices, mesh.topology_summary().components), (4, 1), "welded again");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What can be foretold of charts whose seams do not follow the cells any more: the area ratio of each, and which of
+//! What can be predicted of charts whose seams do not follow the cells any more: the area ratio of each, and which of
 //! its loops had better be the outer one.
 //!
 //! A tube that is open at both ends can be mapped from either; but where three tubes meet, or a tube widens, the choice
@@ -15,7 +15,7 @@ use crate::topology::HalfEdgeId;
 
 /// The prediction for a chart.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Verdict {
+pub(super) struct Prediction {
     pub ratio: f64,
     /// A half-edge of the loop that had better be the outer one.
     pub outer: HalfEdgeId,
@@ -25,29 +25,29 @@ pub(super) struct Verdict {
 ///
 /// # Errors
 /// [`Interrupted`].
-pub(super) fn judge(network: &Network, cells: &Cells) -> Result<Vec<Option<Verdict>>, Interrupted> {
+pub(super) fn evaluate(network: &Network, cells: &Cells) -> Result<Vec<Option<Prediction>>, Interrupted> {
     network.dual.checkpoint()?;
     let (cut, labels) = cut(network, cells);
     let complex = Complex::new(network.dual, &cut);
     let graph = CellGraph::new(&complex);
     let mut regions = Regions::new(&complex, labels, network.label_count());
-    let mut verdicts = Vec::with_capacity(network.label_count());
+    let mut predictions = Vec::with_capacity(network.label_count());
     for label in 0..network.label_count() {
         network.dual.checkpoint.after(WORK_PER_CELL * regions.all[label].cells.len())?;
         let outline = regions.outline_of(label as u32);
         let map = predict(&complex, &graph, &regions.all[label].cells, &outline.loops);
         let first_arc = outline.loops.get(map.outer).and_then(|l| l.first());
         let outer = first_arc.map(|arc| complex.arcs[*arc as usize].first);
-        verdicts.push(outer.map(|outer| Verdict { ratio: map.area_ratio, outer }));
+        predictions.push(outer.map(|outer| Prediction { ratio: map.area_ratio, outer }));
     }
-    Ok(verdicts)
+    Ok(predictions)
 }
 
 /// The pieces into which labels cut the cells, and the label of each.
 fn cut(network: &Network, cells: &Cells) -> (Cells, Vec<u32>) {
     let mut labels = Vec::new();
     // Per cell its labels with their pieces: mostly one, and hardly ever more than three.
-    let mut known: Vec<Vec<(u32, u32)>> = vec![Vec::new(); cells.count];
+    let mut known: Vec<Vec<(u32, u32)>> = vec![Vec::new(); cells.len];
     let mut piece = |cell: u32, label: u32| {
         let known = &mut known[cell as usize];
         if let Some((_, piece)) = known.iter().find(|k| k.0 == label) {
@@ -57,13 +57,13 @@ fn cut(network: &Network, cells: &Cells) -> (Cells, Vec<u32>) {
         known.push((label, labels.len() as u32 - 1));
         labels.len() as u32 - 1
     };
-    let of = cells.of.iter().zip(&network.labels).map(|(cell, label)| piece(*cell, *label)).collect();
-    (Cells { of, count: labels.len() }, labels)
+    let of = cells.labels.iter().zip(&network.labels).map(|(cell, label)| piece(*cell, *label)).collect();
+    (Cells { labels: of, len: labels.len() }, labels)
 }
 
 /// Makes the predicted loops the outer ones.
-pub(super) fn choose_outer(atlas: &mut Atlas, verdicts: &[Option<Verdict>]) {
-    let mut outer: Vec<HalfEdgeId> = verdicts.iter().flatten().map(|v| v.outer).collect();
+pub(super) fn choose_outer(atlas: &mut Atlas, predictions: &[Option<Prediction>]) {
+    let mut outer: Vec<HalfEdgeId> = predictions.iter().flatten().map(|v| v.outer).collect();
     outer.sort_unstable();
     for chart in atlas.charts.iter_mut() {
         let faces = &chart.faces;

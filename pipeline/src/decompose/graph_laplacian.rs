@@ -11,38 +11,40 @@ const NONE: u32 = u32::MAX;
 /// The strict lower triangle of a matrix by rows: columns and values, of which those in one place add up.
 type LowerRows = Csr<(u32, f64)>;
 
-/// A system that is put together from springs between unknowns, or between an unknown and a fixed place.
-pub(super) struct Springs {
+/// The Laplacian of a weighted graph, put together from edges between unknowns, and between an unknown and a node of which
+/// the uv are given.
+pub(super) struct GraphLaplacian {
     diagonal: Vec<f64>,
-    joints: Vec<(u32, u32, f64)>,
-    pull: Vec<[f64; 2]>,
+    off_diagonal: Vec<(u32, u32, f64)>,
+    rhs: Vec<[f64; 2]>,
 }
 
-impl Springs {
+impl GraphLaplacian {
     pub(super) fn new(unknowns: usize) -> Self {
-        Self { diagonal: vec![0.0; unknowns], joints: Vec::new(), pull: vec![[0.0; 2]; unknowns] }
+        Self { diagonal: vec![0.0; unknowns], off_diagonal: Vec::new(), rhs: vec![[0.0; 2]; unknowns] }
     }
 
-    /// Joins two different unknowns.
-    pub(super) fn join(&mut self, [i, j]: [u32; 2], stiffness: f64) {
-        self.diagonal[i as usize] += stiffness;
-        self.diagonal[j as usize] += stiffness;
-        self.joints.push((i.max(j), i.min(j), -stiffness));
+    /// Adds an edge between two different unknowns.
+    pub(super) fn add_edge(&mut self, [i, j]: [u32; 2], weight: f64) {
+        self.diagonal[i as usize] += weight;
+        self.diagonal[j as usize] += weight;
+        self.off_diagonal.push((i.max(j), i.min(j), -weight));
     }
 
-    /// Joins an unknown to a place.
-    pub(super) fn hold(&mut self, i: u32, stiffness: f64, place: [f64; 2]) {
-        self.diagonal[i as usize] += stiffness;
-        (0..2).for_each(|k| self.pull[i as usize][k] += stiffness * place[k]);
+    /// Adds an edge between an unknown and a node with these uv.
+    pub(super) fn add_dirichlet(&mut self, i: u32, weight: f64, uv: [f64; 2]) {
+        self.diagonal[i as usize] += weight;
+        (0..2).for_each(|k| self.rhs[i as usize][k] += weight * uv[k]);
     }
 
-    /// Where the unknowns come to rest; none where the matrix is not positive definite in doubles.
-    pub(super) fn rest(self) -> Option<Vec<[f64; 2]>> {
-        let by_row = || self.joints.iter().map(|(i, j, value)| (*i, (*j, *value)));
+    /// The uv of the unknowns for which the sum of all weights times squared lengths is least; none where the matrix is not
+    /// positive definite in doubles.
+    pub(super) fn solve(self) -> Option<Vec<[f64; 2]>> {
+        let by_row = || self.off_diagonal.iter().map(|(i, j, value)| (*i, (*j, *value)));
         let rows = Csr::sorted(self.diagonal.len(), by_row);
         let mut factor = Factor::shaped(&rows);
-        factor.fill(&rows, &self.diagonal)?;
-        Some(factor.solve(self.pull))
+        let is_definite = factor.fill(&rows, &self.diagonal);
+        is_definite.then(|| factor.solve(self.rhs))
     }
 }
 
@@ -95,8 +97,8 @@ impl Factor {
         reach.reverse();
     }
 
-    /// Computes all rows; none where a pivot is not positive.
-    fn fill(&mut self, rows: &LowerRows, diagonal: &[f64]) -> Option<()> {
+    /// Computes all rows; whether all pivots are positive: where one is not, the rows after it are not computed.
+    fn fill(&mut self, rows: &LowerRows, diagonal: &[f64]) -> bool {
         let n = rows.len();
         let (mut flags, mut reach) = (vec![NONE; n], Vec::new());
         // Per column, how many of its entries are known.
@@ -116,11 +118,11 @@ impl Factor {
                 known[i] += 1;
             }
             if pivot.is_nan() || pivot <= 0.0 {
-                return None;
+                return false;
             }
             self.diagonal.push(pivot);
         }
-        Some(())
+        true
     }
 
     fn solve(&self, mut x: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
@@ -143,20 +145,20 @@ mod tests {
 
     #[test]
     fn a_chain_of_springs_stretches_linearly() {
-        let mut chain = Springs::new(50);
-        chain.hold(0, 1.0, [0.0, 7.0]);
-        chain.hold(49, 1.0, [51.0, 7.0]);
+        let mut chain = GraphLaplacian::new(50);
+        chain.add_dirichlet(0, 1.0, [0.0, 7.0]);
+        chain.add_dirichlet(49, 1.0, [51.0, 7.0]);
         // A star order fills in: every second unknown first.
         let place = |i: u32| if i.is_multiple_of(2) { i / 2 } else { 25 + i / 2 };
-        let mut shuffled = Springs::new(50);
-        shuffled.hold(place(0), 1.0, [0.0, 7.0]);
-        shuffled.hold(place(49), 1.0, [51.0, 7.0]);
+        let mut shuffled = GraphLaplacian::new(50);
+        shuffled.add_dirichlet(place(0), 1.0, [0.0, 7.0]);
+        shuffled.add_dirichlet(place(49), 1.0, [51.0, 7.0]);
         for i in 0..49 {
-            chain.join([i, i + 1], 1.0);
-            shuffled.join([place(i + 1), place(i)], 0.5);
-            shuffled.join([place(i), place(i + 1)], 0.5);
+            chain.add_edge([i, i + 1], 1.0);
+            shuffled.add_edge([place(i + 1), place(i)], 0.5);
+            shuffled.add_edge([place(i), place(i + 1)], 0.5);
         }
-        let (rest, again) = (chain.rest().expect("held"), shuffled.rest().expect("held"));
+        let (rest, again) = (chain.solve().expect("held"), shuffled.solve().expect("held"));
         for i in 0..50 {
             let wanted = [f64::from(i + 1), 7.0];
             for found in [rest[i as usize], again[place(i) as usize]] {
@@ -167,8 +169,8 @@ mod tests {
 
     #[test]
     fn what_nothing_holds_does_not_come_to_rest() {
-        let mut loose = Springs::new(2);
-        loose.join([0, 1], 1.0);
-        assert!(loose.rest().is_none());
+        let mut loose = GraphLaplacian::new(2);
+        loose.add_edge([0, 1], 1.0);
+        assert!(loose.solve().is_none());
     }
 }

@@ -17,25 +17,25 @@ pub(super) struct Path {
 
 impl Network<'_> {
     /// Takes the seam along a path away, so that another one can be laid.
-    pub(super) fn lift(&mut self, path: &[HalfEdgeId]) {
+    pub(super) fn remove_seam(&mut self, path: &[HalfEdgeId]) {
         path.iter().for_each(|h| self.set_seam(*h, false));
     }
 
-    /// Puts a lifted seam back.
-    pub(super) fn put_back(&mut self, path: &[HalfEdgeId]) {
+    /// Puts a removed seam back.
+    pub(super) fn restore_seam(&mut self, path: &[HalfEdgeId]) {
         path.iter().for_each(|h| self.set_seam(*h, true));
     }
 
-    /// Lays seams in the place of `lifted` ones: the triangles up to the other seams change their labels. Undone, with
-    /// the lifted seams put back (and `false`), where one of the charts `labels` would be illegal or too large, or
+    /// Lays seams in the place of `removed` ones: the triangles up to the other seams change their labels. Undone, with
+    /// the removed seams put back (and `false`), where one of the charts `labels` would be illegal or too large, or
     /// smaller than half of what it was at first.
-    pub(super) fn lay(&mut self, lifted: &[HalfEdgeId], paths: &[Path], labels: &[u32]) -> bool {
+    pub(super) fn reroute(&mut self, removed: &[HalfEdgeId], paths: &[Path], labels: &[u32]) -> bool {
         self.claimed.clear();
         let added: Vec<HalfEdgeId> = paths.iter().flat_map(|p| p.half_edges.iter().copied()).collect();
-        self.put_back(&added);
+        self.restore_seam(&added);
         let mut changed = Vec::new();
         let fits = self.flood(paths, labels, &mut changed)
-            && labels.iter().all(|l| self.areas[*l as usize] >= self.least[*l as usize])
+            && labels.iter().all(|l| self.areas[*l as usize] >= self.min_areas[*l as usize])
             && {
                 self.renew_boundaries(labels, &added, &changed);
                 labels.iter().all(|l| self.is_legal(*l))
@@ -44,9 +44,9 @@ impl Network<'_> {
             for (face, label) in changed.iter().rev() {
                 self.relabel(*face, *label);
             }
-            self.lift(&added);
-            self.put_back(lifted);
-            self.renew_boundaries(labels, lifted, &changed);
+            self.remove_seam(&added);
+            self.restore_seam(removed);
+            self.renew_boundaries(labels, removed, &changed);
         }
         fits
     }
@@ -70,7 +70,7 @@ impl Network<'_> {
         let mut stack: Vec<FaceId> = Vec::new();
         for path in new {
             for h in &path.half_edges {
-                let beyond = self.dual.across(*h).map(|t| (t.face(), path.right));
+                let beyond = self.dual.twin(*h).map(|t| (t.face(), path.right));
                 for (face, label) in [Some((h.face(), path.left)), beyond].into_iter().flatten() {
                     if !self.claim(face, label, labels, changed, &mut stack) {
                         return false;
@@ -81,7 +81,7 @@ impl Network<'_> {
         while let Some(face) = stack.pop() {
             let label = self.labels[face.index()];
             for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
-                let Some(t) = self.dual.across(h) else { continue };
+                let Some(t) = self.dual.twin(h) else { continue };
                 if self.is_seam(h) == (self.label(t) != label) {
                     continue;
                 }
@@ -135,7 +135,7 @@ impl Network<'_> {
             boundary.retain(|h| self.bounds(*h, *label));
             let around = |(face, _): &(FaceId, u32)| [0, 1, 2].map(|k| HalfEdgeId::side_of(*face, k));
             let near = laid.iter().copied().chain(changed.iter().flat_map(around));
-            let sides = near.flat_map(|h| [Some(h), self.dual.across(h)]).flatten();
+            let sides = near.flat_map(|h| [Some(h), self.dual.twin(h)]).flatten();
             boundary.extend(sides.filter(|h| self.bounds(*h, *label)));
             boundary.sort_unstable();
             boundary.dedup();
@@ -160,12 +160,12 @@ impl Network<'_> {
         let next = |h| partition.next(h);
         walk_loops(starts, &mut self.seen_half_edges, HalfEdgeId::index, next, |h, begins| {
             has_seam &= !begins;
-            let meets_seam = !has_seam && dual.across(h).is_some();
+            let meets_seam = !has_seam && dual.twin(h).is_some();
             has_seam |= meets_seam;
             shape.loops += usize::from(begins);
             shape.seam_loops += usize::from(meets_seam);
             shape.pinches += usize::from(!seen_vertices.visit(dual.from(h)));
-            shape.meets_itself |= dual.foes(h).iter().any(|f| labels[f.index()] == label);
+            shape.meets_itself |= dual.coincident_faces(h).iter().any(|f| labels[f.index()] == label);
         });
         shape
     }
@@ -193,16 +193,16 @@ mod tests {
     }
 
     /// Lays a seam, or a part of one, along a shortest path through vertices that are chosen at random.
-    fn lay_some(network: &mut Network, random: &mut Random) -> Option<bool> {
+    fn reroute_some(network: &mut Network, random: &mut Random) -> Option<bool> {
         let curves = network.curves();
         let curve = &curves[random.below(curves.len())];
         let from = random.below(curve.len());
         let path = &curve[from..from + 1 + random.below(curve.len() - from)];
         let (first, last) = (path[0], path[path.len() - 1]);
-        let (left, right) = (network.label(first), network.label(network.dual.across(first)?));
+        let (left, right) = (network.label(first), network.label(network.dual.twin(first)?));
         let (root, target) = (network.dual.from(first), network.dual.to(last));
         let band: Vec<bool> = (0..network.dual.mesh.points().len()).map(|_| random.below(4) > 0).collect();
-        network.lift(path);
+        network.remove_seam(path);
         let labels = [left, right];
         let barred = vec![false; network.dual.mesh.edges().len()];
         let bounds =
@@ -210,10 +210,10 @@ mod tests {
         let mut tree = Tree::new(network.dual);
         tree.grow(network, root, &bounds).expect("nobody interrupts");
         let Some(half_edges) = tree.path(network.dual, target).filter(|path| !path.is_empty()) else {
-            network.put_back(path);
+            network.restore_seam(path);
             return None;
         };
-        Some(network.lay(path, &[Path { half_edges, left, right }], &labels))
+        Some(network.reroute(path, &[Path { half_edges, left, right }], &labels))
     }
 
     #[test]
@@ -226,12 +226,12 @@ mod tests {
             let cells = compact_cells(&dual, |_| charts, &dual.checkpoint).expect("nobody cancels");
             let largest = 11 * mesh.triangles().len() / charts / 10;
             let limits = Limits { area_ratio: 1e6, triangles: largest, strict_disks: false };
-            let mut network = Network::new(&dual, cells.of, limits);
+            let mut network = Network::new(&dual, cells.labels, limits);
             let mut random = Random(7);
             let (mut laid, mut undone) = (0, 0);
             for _ in 0..200 {
                 let before = network.labels.clone();
-                match lay_some(&mut network, &mut random) {
+                match reroute_some(&mut network, &mut random) {
                     Some(true) => laid += 1,
                     other => {
                         undone += usize::from(other.is_some());

@@ -17,9 +17,9 @@ const SWEEPS: usize = 8;
 
 /// The principal axes of the normals of every component: the eigenvectors of the sum of a n n^T over its cells, by
 /// Jacobi's rotations (Golub and Van Loan, Matrix Computations, 8.5).
-pub(super) fn axes(complex: &Complex, components: &Cells) -> Vec<Axes> {
-    let mut spread = vec![[[0.0; 3]; 3]; components.count];
-    for (cell, component) in complex.cells.iter().zip(&components.of) {
+pub(super) fn principal_axes(complex: &Complex, components: &Cells) -> Vec<Axes> {
+    let mut spread = vec![[[0.0; 3]; 3]; components.len];
+    for (cell, component) in complex.cells.iter().zip(&components.labels) {
         for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
             spread[*component as usize][i][j] += cell.normal[i] * cell.normal[j] / cell.area.max(f64::MIN_POSITIVE);
         }
@@ -47,7 +47,7 @@ fn eigenvectors(mut a: [Vec3; 3]) -> Axes {
 }
 
 /// Whether a region faces along this axis.
-pub(super) fn faces(region: &Region, axis: Vec3) -> bool {
+pub(super) fn faces_along(region: &Region, axis: Vec3) -> bool {
     dot(region.normal, axis) > 0.0
 }
 

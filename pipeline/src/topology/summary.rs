@@ -6,7 +6,7 @@ use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
 /// The numbers that tell what a triangulated surface is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Census {
+pub struct TopologySummary {
     /// Vertices that a triangle uses.
     pub vertices: usize,
     /// Triangles.
@@ -33,14 +33,14 @@ pub struct Census {
 
 /// The sheets around each vertex: corners of triangles, grouped where two triangles share an edge at the vertex.
 #[derive(Clone, Debug)]
-pub struct Umbrellas {
-    /// Per corner (`3 * face + corner`), the umbrella it belongs to; numbered in the order of first corners.
+pub struct VertexFans {
+    /// Per corner (`3 * face + corner`), the fan it belongs to; numbered in the order of first corners.
     pub of_corner: Vec<u32>,
     /// How many there are.
     pub count: usize,
 }
 
-impl Umbrellas {
+impl VertexFans {
     /// Groups the corners of `triangles`; edges of three or more of them part sheets.
     pub fn new(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Self {
         Self::through(triangles, edges, 2)
@@ -51,18 +51,18 @@ impl Umbrellas {
         let mut sets = UnionFind::new(3 * triangles.len());
         for (_, sides) in edges.iter().filter(|(_, sides)| sides.len() <= most) {
             for (a, b) in sides.windows(2).flat_map(|pair| matching_corners(triangles, pair[0], pair[1])) {
-                sets.unite(a, b);
+                sets.merge(a, b);
             }
         }
         let (of_corner, count) = sets.labels();
         Self { of_corner, count }
     }
 
-    /// The vertex of each umbrella.
+    /// The vertex of each fan.
     pub fn vertices(&self, triangles: &[[VertexId; 3]]) -> Vec<VertexId> {
         let mut vertices = vec![VertexId(0); self.count];
-        for (corner, &umbrella) in self.of_corner.iter().enumerate() {
-            vertices[umbrella as usize] = triangles[corner / 3][corner % 3];
+        for (corner, &fan) in self.of_corner.iter().enumerate() {
+            vertices[fan as usize] = triangles[corner / 3][corner % 3];
         }
         vertices
     }
@@ -124,20 +124,20 @@ pub(crate) fn orientation(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Ori
     found
 }
 
-impl Census {
+impl TopologySummary {
     /// Counts everything about `triangles`, whose corners are distinct.
     pub fn new(triangles: &[[VertexId; 3]], edges: &EdgeTable) -> Self {
         // What touches along a non-manifold edge touches in its ends, too: that is no defect of its own.
-        let umbrellas = Umbrellas::through(triangles, edges, usize::MAX);
-        let (vertices, nonmanifold_vertices) = count_vertices(&umbrellas.vertices(triangles));
+        let fans = VertexFans::through(triangles, edges, usize::MAX);
+        let (vertices, nonmanifold_vertices) = count_vertices(&fans.vertices(triangles));
         let orientable = orientation(triangles, edges).orientable.iter().all(|o| *o);
         let nonmanifold_edges = edges.iter().filter(|(_, s)| s.len() > 2).count();
         let inconsistent = |s: &[HalfEdgeId]| matches!(*s, [g, h] if !opposed(triangles, g, h));
         let components = count_components(triangles.len(), edges);
-        let boundary_loops = count_loops(edges, &umbrellas);
+        let boundary_loops = count_loops(edges, &fans);
         let cells = triangles.len() as i64 - edges.len() as i64;
-        // Sheets that only touch in a vertex are apart: the genus counts a vertex once per umbrella.
-        let handles = 2 * components as i64 - boundary_loops as i64 - (umbrellas.count as i64 + cells);
+        // Sheets that only touch in a vertex are apart: the genus counts a vertex once per fan.
+        let handles = 2 * components as i64 - boundary_loops as i64 - (fans.count as i64 + cells);
         let closed_up = orientable && nonmanifold_edges == 0;
         Self {
             vertices,
@@ -161,12 +161,12 @@ impl Census {
     }
 }
 
-/// The number of vertices, and how many umbrellas there are beyond one for each.
-fn count_vertices(umbrella_vertices: &[VertexId]) -> (usize, usize) {
-    let mut vertices = umbrella_vertices.to_vec();
+/// The number of vertices, and how many fans there are beyond one for each.
+fn count_vertices(fan_vertices: &[VertexId]) -> (usize, usize) {
+    let mut vertices = fan_vertices.to_vec();
     vertices.sort_unstable();
     vertices.dedup();
-    (vertices.len(), umbrella_vertices.len() - vertices.len())
+    (vertices.len(), fan_vertices.len() - vertices.len())
 }
 
 /// The number of parts connected through edges.
@@ -174,22 +174,22 @@ pub(crate) fn count_components(faces: usize, edges: &EdgeTable) -> usize {
     let mut sets = UnionFind::new(faces);
     for (_, sides) in edges.iter() {
         for pair in sides.windows(2) {
-            sets.unite(pair[0].face().index(), pair[1].face().index());
+            sets.merge(pair[0].face().index(), pair[1].face().index());
         }
     }
     sets.labels().1
 }
 
-/// Boundary edges that end in the same umbrella belong to the same loop.
-fn count_loops(edges: &EdgeTable, umbrellas: &Umbrellas) -> usize {
+/// Boundary edges that end in the same fan belong to the same loop.
+fn count_loops(edges: &EdgeTable, fans: &VertexFans) -> usize {
     let boundary: Vec<HalfEdgeId> = edges.iter().filter(|(_, s)| s.len() == 1).map(|(_, s)| s[0]).collect();
     let mut sets = UnionFind::new(boundary.len());
-    let mut seen = vec![u32::MAX; umbrellas.count];
+    let mut seen = vec![u32::MAX; fans.count];
     for (i, h) in boundary.iter().enumerate() {
         for corner in [h.index(), h.next().index()] {
-            let last = &mut seen[umbrellas.of_corner[corner] as usize];
+            let last = &mut seen[fans.of_corner[corner] as usize];
             if *last != u32::MAX {
-                sets.unite(i, *last as usize);
+                sets.merge(i, *last as usize);
             }
             *last = i as u32;
         }
@@ -201,30 +201,30 @@ fn count_loops(edges: &EdgeTable, umbrellas: &Umbrellas) -> usize {
 mod tests {
     use super::*;
 
-    fn census(triangles: &[[u32; 3]]) -> Census {
+    fn summary(triangles: &[[u32; 3]]) -> TopologySummary {
         let triangles: Vec<_> = triangles.iter().map(|t| t.map(VertexId)).collect();
-        Census::new(&triangles, &EdgeTable::new(&triangles))
+        TopologySummary::new(&triangles, &EdgeTable::new(&triangles))
     }
 
     #[test]
     fn a_tetrahedron_is_a_sphere_and_without_a_face_a_disk() {
         let tetrahedron = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-        let sphere = census(&tetrahedron);
+        let sphere = summary(&tetrahedron);
         assert_eq!((sphere.euler, sphere.genus, sphere.boundary_loops), (2, Some(0), 0));
         assert!(!sphere.is_one_chart());
-        assert!(census(&tetrahedron[..3]).is_one_chart());
+        assert!(summary(&tetrahedron[..3]).is_one_chart());
     }
 
     #[test]
     fn sheets_that_touch_in_a_vertex_are_two_components() {
-        let bow_tie = census(&[[0, 1, 2], [0, 3, 4]]);
+        let bow_tie = summary(&[[0, 1, 2], [0, 3, 4]]);
         assert_eq!((bow_tie.components, bow_tie.boundary_loops, bow_tie.nonmanifold_vertices), (2, 2, 1));
         assert_eq!((bow_tie.euler, bow_tie.genus), (1, Some(0)));
     }
 
     #[test]
     fn a_book_of_three_pages_is_not_manifold() {
-        let book = census(&[[0, 1, 2], [1, 0, 3], [0, 1, 4]]);
+        let book = summary(&[[0, 1, 2], [1, 0, 3], [0, 1, 4]]);
         assert_eq!((book.nonmanifold_edges, book.genus, book.components), (1, None, 1));
         assert_eq!((book.nonmanifold_vertices, book.boundary_loops), (0, 1));
     }
@@ -232,16 +232,16 @@ mod tests {
     #[test]
     fn a_moebius_strip_cannot_be_oriented() {
         let strip: Vec<_> = (0..5).map(|i| [i, (i + 1) % 5, (i + 2) % 5]).collect();
-        let moebius = census(&strip);
+        let moebius = summary(&strip);
         assert!(!moebius.orientable);
         assert_eq!((moebius.boundary_loops, moebius.euler, moebius.genus), (1, 0, None));
     }
 
     #[test]
     fn a_flipped_triangle_is_counted_as_inconsistent() {
-        let square = census(&[[0, 1, 2], [0, 3, 2]]);
+        let square = summary(&[[0, 1, 2], [0, 3, 2]]);
         assert_eq!((square.inconsistent_edges, square.orientable), (1, true));
-        assert_eq!(census(&[[0, 1, 2], [2, 3, 0]]).inconsistent_edges, 0);
-        assert_eq!(census(&[[0, 1, 2], [0, 2, 3]]).inconsistent_edges, 0);
+        assert_eq!(summary(&[[0, 1, 2], [2, 3, 0]]).inconsistent_edges, 0);
+        assert_eq!(summary(&[[0, 1, 2], [0, 2, 3]]).inconsistent_edges, 0);
     }
 }
