@@ -1,8 +1,9 @@
 //! Connectivity without positions: which triangles meet where.
 //!
-//! Nothing in here knows a coordinate or a length, so that every statement holds for flat and curved, good and bad
-//! triangulations alike: typed ids, the edges of a triangulation, the stars of its vertices, sheets and counts, and the
-//! containers that such walks need.
+//! Nothing in here knows a coordinate, so that every statement holds for flat and curved, good and bad triangulations alike.
+//! (The lengths that shortest paths are made of come from whoever walks.) What walks over surfaces need is here once: typed
+//! ids; the edges of a triangulation, and the stars of its vertices; compressed rows, disjoint sets and stamps of visits;
+//! loops, partitions by labels, and shortest paths; and the numbers that tell what a surface is.
 
 pub(crate) mod csr;
 pub(crate) mod dijkstra;
