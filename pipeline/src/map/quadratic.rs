@@ -140,7 +140,7 @@ mod tests {
     use crate::{decompose, repair, shapes};
 
     #[test]
-    fn the_map_has_no_more_energy_than_the_raised_linear_one() {
+    fn the_map_has_no_more_energy_than_the_degree_elevated_linear_one() {
         let mesh = repair(&shapes::disk_with_holes(13, 2), &Default::default()).expect("a surface").mesh;
         let chart = FilledChart::new(
             &decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").charts()[0],
