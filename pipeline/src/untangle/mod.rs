@@ -37,7 +37,8 @@ use crate::topology::FaceId;
 pub use objective::{Dirichlet, LocalModel, Objective};
 use patch::Stuck;
 
-/// Above this share of invalid triangles the feasible path is taken at once.
+/// Above this share of invalid triangles the feasible path is taken at once: patches would grow together. Patches were
+/// enough at 55 of 1,076 and not always at 221 of 6,189 (3.6 %); trying costs little beside the other path.
 const FEW: f64 = 0.1;
 
 /// How the result was found.

@@ -18,23 +18,27 @@ use crate::map::quadratic::{QuadraticMap, det, invalid_triangles, node_to_grid};
 use crate::monitor::{Checkpoint, Interrupted};
 use crate::topology::{FaceId, HalfEdgeId, Stars, VertexId};
 
-/// Rings around invalid triangles, one attempt after another.
+/// Rings around invalid triangles, one attempt after another. Where the rim of a small patch admits no valid map only a
+/// larger one helps; each costs about twice the one before. Chosen by experience.
 const RINGS: [usize; 5] = [2, 4, 7, 12, 20];
 
 /// Patches with more triangles than this share of the chart are left to the feasible path.
 const MAX_SHARE: f64 = 0.5;
 
-/// Weight of the regularised penalty, relative to the area of each triangle in the plane.
+/// Weight of the regularised penalty, relative to the objective. The heavier the sooner triangles turn over, and the
+/// farther the patch ends from the harmonic map, to which the barrier then has to bring it back. Chosen by experience.
 const PULL: f64 = 3e-2;
 
 /// The least width of the regularised penalty, relative to a typical jacobian.
 const MIN_WIDTH: f64 = 1e-4;
 
-/// Changes of the regularised penalty's width, and Newton steps for each.
+/// Changes of the regularised penalty's width, and Newton steps for each: few, as the width is to follow the worst
+/// jacobian. Chosen by experience.
 const ROUNDS: usize = 25;
 const STEPS_PER_ROUND: usize = 4;
 
-/// The weights of the barrier that follows, and Newton steps for each.
+/// The weights of the barrier that follows, and Newton steps for each. The last one is what keeps the result off the
+/// harmonic map: about its share of the energy.
 const WEIGHTS: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 const STEPS_PER_WEIGHT: usize = 10;
 
@@ -118,12 +122,12 @@ pub(super) fn untangle<O: Objective>(
 }
 
 /// The triangles that must change: invalid ones, and those at arcs of holes that no point can see.
-fn seeds(chart: &FilledChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]) -> Vec<u32> {
-    let mut seeds: Vec<u32> = invalid_triangles(chart, nodes).iter().map(|f| f.0).collect();
+fn seeds(chart: &FilledChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]) -> Vec<FaceId> {
+    let mut seeds = invalid_triangles(chart, nodes);
     for (k, hole) in chart.loops().iter().enumerate().filter(|(k, _)| centres[*k].is_none()) {
         let hidden =
             |h: &&HalfEdgeId| arc(chart, nodes, **h).products(nodes[chart.centre_node(k)]).iter().any(|p| *p >= 0);
-        seeds.extend(hole.iter().filter(hidden).map(|h| h.face().0));
+        seeds.extend(hole.iter().filter(hidden).map(|h| h.face()));
     }
     seeds.sort_unstable();
     seeds.dedup();
@@ -165,7 +169,7 @@ impl<'a, O: Objective> PatchContext<'a, O> {
     /// the `weight` of each vertex: the nodes that moved.
     fn solve(
         &self,
-        faces: &[u32],
+        faces: &[FaceId],
         x: &[[f64; 2]],
         weight: impl Fn(usize) -> f64,
         stats: &mut Stats,
@@ -183,8 +187,8 @@ impl<'a, O: Objective> PatchContext<'a, O> {
         let mut moved: Vec<Moved> = problem.moved(&local).collect();
         moved.sort_unstable_by_key(|m| m.node);
         let place = |n: usize| moved.binary_search_by_key(&n, |m| m.node).map_or(x[n], |i| moved[i].uv);
-        let cell = |f: &u32| self.chart.nodes(*f as usize).map(|n| node_to_grid(self.chart, n, place(n)));
-        let mut own = faces.iter().filter(|f| (**f as usize) < self.chart.chart_triangles());
+        let cell = |f: &FaceId| self.chart.nodes(f.index()).map(|n| node_to_grid(self.chart, n, place(n)));
+        let mut own = faces.iter().filter(|f| f.index() < self.chart.chart_triangles());
         if !own.all(|f| JacobianBezier::new(cell(f)).validity() != Validity::Invalid) {
             return Err(Stuck::Invalid);
         }
@@ -194,13 +198,13 @@ impl<'a, O: Objective> PatchContext<'a, O> {
 
     /// Moves free nodes towards the feasible start, by a share that `weight` gives for each vertex (cut to 0 and 1)
     /// and that mid-edge nodes take from both ends.
-    fn blend(&self, x: &mut [[f64; 2]], problem: &Problem<O>, faces: &[u32], weight: impl Fn(usize) -> f64) {
+    fn blend(&self, x: &mut [[f64; 2]], problem: &Problem<O>, faces: &[FaceId], weight: impl Fn(usize) -> f64) {
         let own = self.chart.chart_vertices();
         let share = |v: VertexId| if v.index() < own { weight(v.index()).clamp(0.0, 1.0) } else { 0.0 };
         let mut shares: Vec<(usize, f64)> = Vec::with_capacity(6 * faces.len());
         for f in faces {
-            let nodes = self.chart.nodes(*f as usize);
-            let corner = self.chart.triangles()[*f as usize].map(share);
+            let nodes = self.chart.nodes(f.index());
+            let corner = self.chart.triangles()[f.index()].map(share);
             shares.extend((0..3).map(|k| (nodes[k], corner[k])));
             shares.extend((0..3).map(|k| (nodes[3 + k], 0.5 * (corner[k] + corner[(k + 1) % 3]))));
         }
@@ -215,17 +219,17 @@ impl<'a, O: Objective> PatchContext<'a, O> {
     }
 
     /// The problem on a patch: penalties on its triangles and on the arcs of holes in it.
-    fn problem(&self, faces: &[u32]) -> Problem<'a, O> {
-        let own = |f: u32| (f as usize) < self.chart.chart_triangles();
-        let bound = |f: u32| {
-            let density = self.density[f as usize];
+    fn problem(&self, faces: &[FaceId]) -> Problem<'a, O> {
+        let own = |f: FaceId| f.index() < self.chart.chart_triangles();
+        let bound = |f: FaceId| {
+            let density = self.density[f.index()];
             Bound { scale: density, floor: 0.0, weight: self.objective.typical(density), dual: None }
         };
-        let cells = faces.iter().map(|f| Cell { face: FaceId(*f), bounds: own(*f).then(|| [bound(*f); 6]) }).collect();
+        let cells = faces.iter().map(|f| Cell { face: *f, bounds: own(*f).then(|| [bound(*f); 6]) }).collect();
         let mean =
-            faces.iter().map(|f| self.objective.typical(self.density[*f as usize])).sum::<f64>() / faces.len() as f64;
+            faces.iter().map(|f| self.objective.typical(self.density[f.index()])).sum::<f64>() / faces.len() as f64;
         let unset = Bound { scale: 1.0, floor: 0.0, weight: mean, dual: None };
-        let mut arcs = region::arc_cells(self.chart, |h| faces.binary_search(&h.face().0).is_ok(), unset);
+        let mut arcs = region::arc_cells(self.chart, |h| faces.binary_search(&h.face()).is_ok(), unset);
         let free = region::free_nodes(self.chart, &self.stars, &self.fixed, faces);
         for arc in &mut arcs {
             let scale = terms::arc_products(&arc.nodes.map(|n| self.start[n as usize]));
