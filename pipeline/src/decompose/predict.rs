@@ -9,7 +9,7 @@ use super::complex::{Complex, NONE};
 use super::graph_laplacian::GraphLaplacian;
 use super::voronoi::Graph;
 use crate::fem::dofs::Dofs;
-use crate::measure::distortion::quantiles;
+use crate::measure::quantiles::{Weighted, quantiles};
 use crate::topology::csr::Csr;
 use crate::vec3::{Vec3, distance};
 use std::f64::consts::TAU;
@@ -279,15 +279,15 @@ impl<'a> System<'a> {
         for (i, w, p) in &self.rim {
             energy[*i as usize] += w * squared(uv[*i as usize], *p);
         }
-        let mut densities: Vec<(f64, f64)> = (0..self.dofs.count()).map(|i| self.density(i, &energy)).collect();
+        let mut densities: Vec<Weighted> = (0..self.dofs.count()).map(|i| self.density(i, &energy)).collect();
         let [low, high] = quantiles(&mut densities, [QUANTILE, 1.0 - QUANTILE]);
         if low > 0.0 { (high / low).max(1.0) } else { f64::INFINITY }
     }
 
     /// The energy density of a star of cells, and the area of its middle one.
-    fn density(&self, i: usize, energy: &[f64]) -> (f64, f64) {
+    fn density(&self, i: usize, energy: &[f64]) -> Weighted {
         let area = self.graph.area(self.dofs.free()[i]);
-        (energy[i] / area, area)
+        Weighted { value: energy[i] / area, weight: area }
     }
 }
 

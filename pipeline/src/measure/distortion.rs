@@ -7,6 +7,7 @@ use crate::certify::CertifiedMap;
 use crate::fem::bernstein::{self, JacobianBezier};
 use crate::fem::element::{Barycentric, Element, P2};
 use crate::grid::GridPoint;
+use crate::measure::quantiles::{Weighted, quantiles};
 use crate::topology::{Stars, VisitStamps};
 
 /// The fields of one triangle.
@@ -111,38 +112,70 @@ pub(crate) fn conformal_p99_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [Gr
 fn conformal_quantiles<const N: usize>(chart: &Chart, distortion: impl Fn(usize) -> f64, shares: [f64; N]) -> [f64; N] {
     let all_flagged = chart.flagged().iter().all(|f| *f);
     let counted = (0..chart.triangles().len()).filter(|f| all_flagged || !chart.flagged()[*f]);
-    let mut weighted: Vec<_> = counted.map(|f| (distortion(f), chart.shapes()[f].area())).collect();
+    let weighted = |f: usize| Weighted { value: distortion(f), weight: chart.shapes()[f].area() };
+    let mut weighted: Vec<Weighted> = counted.map(weighted).collect();
     quantiles(&mut weighted, shares)
+}
+
+/// Sums areas over stars of two rings.
+struct TwoRings<'a> {
+    chart: &'a Chart,
+    stars: Stars,
+    /// Per triangle its area in the plane, and in space.
+    plane: &'a [f64],
+    space: Vec<f64>,
+    seen_faces: VisitStamps,
+    seen_vertices: VisitStamps,
+}
+
+impl<'a> TwoRings<'a> {
+    fn new(chart: &'a Chart, plane: &'a [f64]) -> Self {
+        let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
+        let vertices = chart.vertices().len();
+        Self {
+            chart,
+            stars: Stars::new(chart.triangles(), vertices),
+            plane,
+            seen_faces: VisitStamps::new(space.len()),
+            space,
+            seen_vertices: VisitStamps::new(vertices),
+        }
+    }
+
+    /// The area scale of the two rings around `v`, with the area of its own star as weight.
+    fn scale(&mut self, v: usize) -> Weighted {
+        self.seen_faces.clear();
+        self.seen_vertices.clear();
+        let (mut in_plane, mut in_space) = (0.0, 0.0);
+        for f in self.stars.around(v) {
+            for u in self.chart.triangles()[*f as usize] {
+                if !self.seen_vertices.visit(u.index()) {
+                    continue;
+                }
+                for f in self.stars.around(u.index()).iter().map(|f| *f as usize) {
+                    if self.seen_faces.visit(f) {
+                        in_plane += self.plane[f];
+                        in_space += self.space[f];
+                    }
+                }
+            }
+        }
+        let weight = self.stars.around(v).iter().map(|f| self.space[*f as usize]).sum::<f64>();
+        Weighted { value: in_plane / in_space, weight }
+    }
 }
 
 /// Per vertex, the area scale of its star of two rings, with the area of its own star as weight; `plane` are the areas
 /// of the triangles in the plane.
-fn star_scales(chart: &Chart, plane: &[f64]) -> Vec<(f64, f64)> {
-    let stars = Stars::new(chart.triangles(), chart.vertices().len());
-    let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
-    let mut seen_faces = VisitStamps::new(space.len());
-    let mut seen_corners = VisitStamps::new(chart.vertices().len());
-    let mut two_rings = |v: usize| {
-        seen_faces.clear();
-        seen_corners.clear();
-        let (mut in_plane, mut in_space) = (0.0, 0.0);
-        let ring = stars.around(v).iter().flat_map(|f| chart.triangles()[*f as usize]);
-        for u in ring.filter(|u| seen_corners.visit(u.index())) {
-            for f in stars.around(u.index()).iter().map(|f| *f as usize).filter(|f| seen_faces.visit(*f)) {
-                in_plane += plane[f];
-                in_space += space[f];
-            }
-        }
-        let weight = stars.around(v).iter().map(|f| space[*f as usize]).sum::<f64>();
-        (in_plane / in_space, weight)
-    };
-    (0..chart.vertices().len()).map(&mut two_rings).collect()
+fn star_scales(chart: &Chart, plane: &[f64]) -> Vec<Weighted> {
+    let mut rings = TwoRings::new(chart, plane);
+    (0..chart.vertices().len()).map(|v| rings.scale(v)).collect()
 }
 
 /// Per triangle, the logarithm of the area scale around it: the mean over its corners, each with its two rings.
 pub(crate) fn log_scales(chart: &Chart, map: &CertifiedMap) -> Vec<f64> {
-    let logs: Vec<f64> =
-        star_scales(chart, &plane_areas(map)).into_iter().map(|(scale, _)| finite(scale).ln()).collect();
+    let scales = star_scales(chart, &plane_areas(map));
+    let logs: Vec<f64> = scales.iter().map(|scale| finite(scale.value).ln()).collect();
     chart.triangles().iter().map(|t| t.iter().map(|v| logs[v.index()]).sum::<f64>() / 3.0).collect()
 }
 
@@ -157,11 +190,11 @@ pub(crate) fn area_ratio_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [GridP
     let area = |f: usize| area_in_plane(&JacobianBezier::new(nodes(f)).coefficients());
     let plane: Vec<f64> = (0..chart.triangles().len()).map(area).collect();
     let mut scales = star_scales(chart, &plane);
-    scales.retain(|s| s.0 > 0.0);
+    scales.retain(|s| s.value > 0.0);
     ratio(scales)
 }
 
-fn ratio(mut scales: Vec<(f64, f64)>) -> f64 {
+fn ratio(mut scales: Vec<Weighted>) -> f64 {
     let [low, high] = quantiles(&mut scales, [0.001, 0.999]);
     finite(high / low)
 }
@@ -172,31 +205,10 @@ fn plane_areas(map: &CertifiedMap) -> Vec<f64> {
     map.map().cells.iter().map(|c| area_in_plane(&JacobianBezier::new(c.map(place)).coefficients())).collect()
 }
 
-/// The values at the given shares of the total weight.
-pub(crate) fn quantiles<const N: usize>(weighted: &mut [(f64, f64)], shares: [f64; N]) -> [f64; N] {
-    weighted.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let total: f64 = weighted.iter().map(|w| w.1).sum();
-    shares.map(|share| {
-        let mut left = share * total;
-        let reached = weighted.iter().find(|w| {
-            left -= w.1;
-            left <= 0.0
-        });
-        reached.or(weighted.last()).map_or(1.0, |w| w.0)
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::parametrize::parametrize_chart;
     use crate::{Order, decompose, repair, shapes};
-
-    #[test]
-    fn quantiles_follow_the_weights() {
-        let mut values = [(3.0, 1.0), (1.0, 1.0), (2.0, 8.0)];
-        assert_eq!(quantiles(&mut values, [0.05, 0.5, 0.95]), [1.0, 2.0, 3.0]);
-    }
 
     #[test]
     fn every_field_is_finite_and_in_its_range() {

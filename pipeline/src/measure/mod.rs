@@ -2,4 +2,5 @@
 
 pub mod curvature;
 pub mod distortion;
+pub(crate) mod quantiles;
 pub mod spikes;

@@ -18,6 +18,8 @@
 //! cut short of the nearest floor. Every loop has a fixed limit. As harmonic map, start and result all include the
 //! energy of the virtual fans (with free nodes), the harmonic energy is a lower bound of the result's.
 
+mod arcs;
+mod curvature;
 mod feasible;
 mod newton;
 mod objective;
@@ -25,7 +27,6 @@ mod patch;
 mod penalty;
 mod problem;
 mod region;
-mod terms;
 
 use crate::certify::{Arc, star_centre};
 use crate::fem::sparse;

@@ -9,7 +9,7 @@ use super::objective::Objective;
 use super::penalty::{Bound, Penalty};
 use super::problem::{Cell, Moved, Problem};
 use super::region;
-use super::{Stats, arc, centre_of_hole, terms, uv_of};
+use super::{Stats, arc, arcs, centre_of_hole, uv_of};
 use crate::fem::bernstein::{JacobianBezier, Validity};
 use crate::fem::sparse;
 use crate::grid::GridPoint;
@@ -232,7 +232,7 @@ impl<'a, O: Objective> PatchContext<'a, O> {
         let mut arcs = region::arc_cells(self.chart, |h| faces.binary_search(&h.face()).is_ok(), unset);
         let free = region::free_nodes(self.chart, &self.stars, &self.fixed, faces);
         for arc in &mut arcs {
-            let scale = terms::arc_products(&arc.nodes.map(|n| self.start[n as usize]));
+            let scale = arcs::products(&arc.nodes.map(|n| self.start[n as usize]));
             (0..3).for_each(|k| arc.bounds[k].scale = scale[k]);
         }
         Problem::new(self.chart, self.objective, cells, arcs, &free, self.checkpoint)

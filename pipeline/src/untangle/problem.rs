@@ -1,8 +1,9 @@
 //! The optimisation problem on a region of a chart: an objective plus penalties, over the nodes that may move.
 
+use super::arcs::{self, ArcNodes};
+use super::curvature::add_curvature;
 use super::objective::{LocalModel, Objective, SCALARS};
 use super::penalty::{Bound, Penalty, Value};
-use super::terms::{self, ArcNodes};
 use crate::fem::dofs::Dofs;
 use crate::fem::jacobian::{CornerDerivatives, P2Nodes};
 use crate::fem::sparse::{Analysis, Error, PRESCRIBED, Pattern, Unsolvable};
@@ -91,7 +92,7 @@ impl<'a, O: Objective> Problem<'a, O> {
         &self.nodes
     }
 
-    /// The uv_of of the region's nodes, out of those of the whole chart.
+    /// The uv of the region's nodes, out of those of the whole chart.
     pub fn gather(&self, all: &[[f64; 2]]) -> Vec<[f64; 2]> {
         self.nodes.iter().map(|n| all[*n as usize]).collect()
     }
@@ -137,7 +138,7 @@ impl<'a, O: Objective> Problem<'a, O> {
             }
         }
         for arc in &self.arcs {
-            let products = terms::arc_products(&arc_uv(arc, x));
+            let products = arcs::products(&arc_uv(arc, x));
             total += (0..3).map(|k| penalty.at(products[k], &arc.bounds[k]).value).sum::<f64>();
         }
         total
@@ -158,7 +159,7 @@ impl<'a, O: Objective> Problem<'a, O> {
                 let dets = corners.dets();
                 let values: [Value; 6] = std::array::from_fn(|k| penalty.at(dets[k], &bounds[k]));
                 let shape = &self.chart.shapes()[cell.face.index()];
-                terms::add_curvature(&mut local.hessian, shape, &values.map(|v| v.multiplier));
+                add_curvature(&mut local.hessian, shape, &values.map(|v| v.multiplier));
                 for (k, value) in values.iter().enumerate() {
                     add_outer(&mut local, value, &corners.gradient(k));
                 }
@@ -167,12 +168,12 @@ impl<'a, O: Objective> Problem<'a, O> {
             self.scatter(&mut model.gradient, &self.of_cell[i], &local.gradient);
         }
         for (i, arc) in self.arcs.iter().enumerate() {
-            let uv_of = arc_uv(arc, x);
-            let products = terms::arc_products(&uv_of);
+            let uv = arc_uv(arc, x);
+            let products = arcs::products(&uv);
             let mut local = LocalModel { gradient: [0.0; SCALARS], hessian: [[0.0; SCALARS]; SCALARS] };
             for k in 0..3 {
                 let value = penalty.at(products[k], &arc.bounds[k]);
-                add_outer(&mut local, &value, &padded(terms::arc_gradient(&uv_of, k)));
+                add_outer(&mut local, &value, &padded(arcs::gradient(&uv, k)));
             }
             pattern.add(&mut model.hessian, self.cells.len() + i, &local.hessian);
             self.scatter(&mut model.gradient, &arc.nodes, &local.gradient);
@@ -201,7 +202,7 @@ impl<'a, O: Objective> Problem<'a, O> {
     /// The largest t at which no penalised quantity of `x + t direction` has fallen to its floor yet.
     pub fn longest_step(&self, x: &[[f64; 2]], direction: &[[f64; 2]]) -> f64 {
         let mut longest = f64::INFINITY;
-        let mut meet = |c0: f64, c1: f64, c2: f64| longest = longest.min(terms::first_zero(c0, c1, c2));
+        let mut meet = |c0: f64, c1: f64, c2: f64| longest = longest.min(first_zero(c0, c1, c2));
         for (i, cell) in self.cells.iter().enumerate() {
             let Some(bounds) = &cell.bounds else { continue };
             let (at, along) =
@@ -211,8 +212,7 @@ impl<'a, O: Objective> Problem<'a, O> {
         }
         for arc in &self.arcs {
             let (at, along) = (arc_uv(arc, x), arc_uv(arc, direction));
-            let (c0, c1, c2) =
-                (terms::arc_products(&at), terms::arc_polarization(&at, &along), terms::arc_products(&along));
+            let (c0, c1, c2) = (arcs::products(&at), arcs::polarization(&at, &along), arcs::products(&along));
             (0..3).for_each(|k| meet(c0[k] - arc.bounds[k].floor, c1[k], c2[k]));
         }
         longest
@@ -227,7 +227,7 @@ impl<'a, O: Objective> Problem<'a, O> {
             }
         }
         for arc in &mut self.arcs {
-            let products = terms::arc_products(&arc_uv(arc, x));
+            let products = arcs::products(&arc_uv(arc, x));
             (0..3).for_each(|k| visit(products[k], &mut arc.bounds[k]));
         }
     }
@@ -246,7 +246,7 @@ impl<'a, O: Objective> Problem<'a, O> {
         }
         for arc in &mut self.arcs {
             let [x, d, y] = [from, direction, to].map(|p| arc_uv(arc, p));
-            let (c, change, new) = (terms::arc_products(&x), terms::arc_polarization(&x, &d), terms::arc_products(&y));
+            let (c, change, new) = (arcs::products(&x), arcs::polarization(&x, &d), arcs::products(&y));
             arc.bounds.iter_mut().enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));
         }
     }
@@ -303,5 +303,33 @@ fn add_outer(local: &mut LocalModel, value: &Value, gradient: &[f64; SCALARS]) {
         for j in 0..=i {
             local.hessian[i][j] += value.second_derivative * gradient[i] * gradient[j];
         }
+    }
+}
+
+/// The least t > 0 at which c0 + c1 t + c2 t^2 falls to zero, where c0 > 0; infinity where it never does.
+fn first_zero(c0: f64, c1: f64, c2: f64) -> f64 {
+    let discriminant = c1 * c1 - 4.0 * c0 * c2;
+    if c2 > 0.0 && (c1 >= 0.0 || discriminant < 0.0) {
+        return f64::INFINITY;
+    }
+    // The form of the root that does not cancel where c1 < 0.
+    let root = discriminant.max(0.0).sqrt();
+    let t = if c1 <= 0.0 { 2.0 * c0 / (root - c1) } else { -(c1 + root) / (2.0 * c2) };
+    if t > 0.0 { t } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zeros_are_found_on_both_branches() {
+        assert_eq!(first_zero(1.0, -1.0, 0.0), 1.0);
+        assert_eq!(first_zero(2.0, -3.0, 1.0), 1.0);
+        assert_eq!(first_zero(2.0, 1.0, -1.0), 2.0);
+        assert_eq!(first_zero(1.0, -1.0, 1.0), f64::INFINITY);
+        assert_eq!(first_zero(1.0, 1.0, 1.0), f64::INFINITY);
+        assert_eq!(first_zero(1.0, 1.0, 0.0), f64::INFINITY);
+        assert_eq!(first_zero(1.0, 0.0, -4.0), 0.5);
     }
 }

@@ -18,7 +18,8 @@ use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
 use crate::fem::sparse;
 use crate::grid::GridPoint;
-use crate::measure::distortion::{Summary, quantiles, singular_ratio};
+use crate::measure::distortion::{Summary, singular_ratio};
+use crate::measure::quantiles::{Weighted, quantiles};
 use crate::monitor::{Interrupted, Monitor};
 pub use conformal::conformal;
 pub use projection::projection;
@@ -103,8 +104,8 @@ fn summary(chart: &Chart, map: &PlanarMap) -> Summary {
         let area = 0.25 * shape.area();
         for (from, to) in parts(flat).into_iter().zip(parts(uv)) {
             let stretch = Stretch::between(from, to);
-            conformal.push((stretch.conformal, area));
-            scales.push((stretch.area, area));
+            conformal.push(Weighted { value: stretch.conformal, weight: area });
+            scales.push(Weighted { value: stretch.area, weight: area });
         }
     }
     let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);

@@ -6,7 +6,7 @@
 use super::{Natural, certified};
 use crate::atlas::Chart;
 use crate::evaluate::Plane;
-use crate::measure::distortion::quantiles;
+use crate::measure::quantiles::{Weighted, quantiles};
 use crate::vec3::{Vec3, cross, dot, norm, sub};
 
 /// The projection of `chart` along the mean of its normals; none where that is not one-to-one, or the
@@ -18,9 +18,9 @@ pub fn projection(chart: &Chart, most: f64) -> Option<Natural> {
     let steepness = |[a, b, c]: [Vec3; 3]| {
         let doubled = cross(sub(b, a), sub(c, a));
         let (area, projected) = (norm(doubled), dot(doubled, plane.normal()));
-        (if projected > 0.0 { area / projected } else { f64::INFINITY }, area)
+        Weighted { value: if projected > 0.0 { area / projected } else { f64::INFINITY }, weight: area }
     };
-    let mut steepness: Vec<(f64, f64)> = triangles().map(steepness).collect();
+    let mut steepness: Vec<Weighted> = triangles().map(steepness).collect();
     let [p99] = quantiles(&mut steepness, [0.99]);
     if p99 > most {
         return None;

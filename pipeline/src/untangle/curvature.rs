@@ -1,7 +1,7 @@
-//! The constrained quantities, their gradients, and the part of their curvature that is kept.
+//! The part of the curvature of penalised coefficients that is kept in the Hessian.
 
 use super::objective::SCALARS;
-use crate::fem::jacobian::{AT_CORNERS, PAIRS, cross};
+use crate::fem::jacobian::{AT_CORNERS, PAIRS};
 use crate::mesh::TriangleShape;
 
 /// A complex-linear form in the six nodal values w = u + i v, sum over n of (re_n + i im_n) w_n.
@@ -80,75 +80,11 @@ impl Wirtinger {
     }
 }
 
-/// The three products of an arc of a hole's loop about a centre, with the sign that makes them positive on a
-/// star-shaped loop: nodes are first end, middle, second end, centre.
-pub(super) type ArcNodes = [[f64; 2]; 4];
-
-/// The pairs of (p0, c, p1) behind the three products.
-const ARC_PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
-
-/// p0, c and p1 relative to the centre, as combinations of the four nodes.
-const ARC_POINTS: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, -1.0], [-0.5, 2.0, -0.5, -1.0], [0.0, 0.0, 1.0, -1.0]];
-
-fn arc_points(x: &ArcNodes) -> [[f64; 2]; 3] {
-    let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
-    ARC_POINTS.map(|c| [0, 1].map(|k| (0..4).map(|n| c[n] * d[n][k]).sum()))
-}
-
-/// The products, positive where the loop is star-shaped (traversed with the chart on its left).
-pub(super) fn arc_products(x: &ArcNodes) -> [f64; 3] {
-    let p = arc_points(x);
-    ARC_PAIRS.map(|(i, j)| -cross(p[i], p[j]))
-}
-
-/// What is linear in t in the products of `x + t y`.
-pub(super) fn arc_polarization(x: &ArcNodes, y: &ArcNodes) -> [f64; 3] {
-    let (p, q) = (arc_points(x), arc_points(y));
-    ARC_PAIRS.map(|(i, j)| -cross(p[i], q[j]) - cross(q[i], p[j]))
-}
-
-/// The gradient of product `k` with respect to the eight nodal values.
-pub(super) fn arc_gradient(x: &ArcNodes, k: usize) -> [f64; 8] {
-    let p = arc_points(x);
-    let (i, j) = ARC_PAIRS[k];
-    let mut g = [0.0; 8];
-    for n in 0..4 {
-        let (ga, gb) = (ARC_POINTS[i][n], ARC_POINTS[j][n]);
-        g[2 * n] = -(ga * p[j][1] - gb * p[i][1]);
-        g[2 * n + 1] = -(gb * p[i][0] - ga * p[j][0]);
-    }
-    g
-}
-
-/// The least t > 0 at which c0 + c1 t + c2 t^2 falls to zero, where c0 > 0; infinity where it never does.
-pub(super) fn first_zero(c0: f64, c1: f64, c2: f64) -> f64 {
-    let discriminant = c1 * c1 - 4.0 * c0 * c2;
-    if c2 > 0.0 && (c1 >= 0.0 || discriminant < 0.0) {
-        return f64::INFINITY;
-    }
-    // The form of the root that does not cancel where c1 < 0.
-    let root = discriminant.max(0.0).sqrt();
-    let t = if c1 <= 0.0 { 2.0 * c0 / (root - c1) } else { -(c1 + root) / (2.0 * c2) };
-    if t > 0.0 { t } else { f64::INFINITY }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::jacobian::samples::{X, Y, moved};
-    use crate::fem::jacobian::{CornerDerivatives, P2Nodes};
-
-    #[test]
-    fn arcs_along_a_line_are_quadratic() {
-        let arc_uv = |s: &P2Nodes| -> ArcNodes { [s[0], s[3], s[1], s[5]] };
-        let (x, y) = (arc_uv(&X), arc_uv(&Y));
-        for k in 0..3 {
-            let quadratic = arc_products(&x)[k] + 0.7 * arc_polarization(&x, &y)[k] + 0.49 * arc_products(&y)[k];
-            assert!((arc_products(&arc_uv(&moved(0.7)))[k] - quadratic).abs() < 1e-14);
-            let slope: f64 = (0..8).map(|i| arc_gradient(&x, k)[i] * y[i / 2][i % 2]).sum();
-            assert!((slope - arc_polarization(&x, &y)[k]).abs() < 1e-14);
-        }
-    }
+    use crate::fem::jacobian::CornerDerivatives;
+    use crate::fem::jacobian::samples::{X, Y};
 
     #[test]
     fn the_kept_curvature_is_positive_and_above_the_true_one() {
@@ -167,16 +103,5 @@ mod tests {
                 assert!(kept >= 0.0 && kept >= curvature - 1e-12, "{k}: {kept} {curvature}");
             }
         }
-    }
-
-    #[test]
-    fn zeros_are_found_on_both_branches() {
-        assert_eq!(first_zero(1.0, -1.0, 0.0), 1.0);
-        assert_eq!(first_zero(2.0, -3.0, 1.0), 1.0);
-        assert_eq!(first_zero(2.0, 1.0, -1.0), 2.0);
-        assert_eq!(first_zero(1.0, -1.0, 1.0), f64::INFINITY);
-        assert_eq!(first_zero(1.0, 1.0, 1.0), f64::INFINITY);
-        assert_eq!(first_zero(1.0, 1.0, 0.0), f64::INFINITY);
-        assert_eq!(first_zero(1.0, 0.0, -4.0), 0.5);
     }
 }
