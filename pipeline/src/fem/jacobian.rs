@@ -1,11 +1,8 @@
 //! The jacobian determinant of a 6-node triangle in doubles: its Bernstein coefficients and their derivatives. What is
 //! decided is decided by [`crate::fem::bernstein`], exactly; this serves optimisation and figures.
 
-use crate::fem::element::{Element, P2};
+use crate::fem::element::{Element, P2, P2Nodes};
 use std::sync::LazyLock;
-
-/// Values at six nodes.
-pub(crate) type P2Nodes = [[f64; 2]; 6];
 
 /// The derivatives of the basis along xi and eta at the three corners.
 pub(crate) static AT_CORNERS: LazyLock<[[[f64; 2]; 6]; 3]> =
@@ -67,7 +64,7 @@ impl CornerDerivatives {
 /// A curved triangle, a direction, and the triangle moved along it.
 #[cfg(test)]
 pub(crate) mod samples {
-    use super::P2Nodes;
+    use crate::fem::element::P2Nodes;
 
     pub(crate) const X: P2Nodes = [[0.0, 0.1], [1.0, 0.0], [0.2, 0.9], [0.5, -0.1], [0.7, 0.5], [0.1, 0.6]];
     pub(crate) const Y: P2Nodes = [[0.3, 0.0], [-0.2, 0.1], [0.0, 0.4], [0.1, 0.2], [-0.3, 0.1], [0.2, -0.5]];

@@ -1,5 +1,12 @@
-//! Finite elements: elements and quadrature on triangles, the jacobian of the 6-node one, and the systems that
-//! elements make.
+//! Finite elements.
+//!
+//! * [`element`]: what an element is, and the two there are; [`quadrature`] and the [`geometry`] of a triangle in space
+//!   make its [`stiffness`] where there is no closed form.
+//! * [`dofs`]: which node has which unknown; [`assembly`]: systems of elements; [`sparse`]: how they are solved.
+//! * [`bernstein`]: whether a quadratic triangle in the plane is valid, exactly.
+//!
+//! Another element is one more file beside [`element::P2`], and a triangle that is curved in space another
+//! [`geometry::FirstForm`]; only what decides validity, and so the untangler, is made for quadratic triangles.
 
 pub mod assembly;
 pub mod bernstein;

@@ -45,7 +45,7 @@ pub(super) fn gradient(x: &ArcNodes, k: usize) -> [f64; 8] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::jacobian::P2Nodes;
+    use crate::fem::element::P2Nodes;
     use crate::fem::jacobian::samples::{X, Y, moved};
 
     #[test]

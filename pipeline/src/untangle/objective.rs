@@ -1,7 +1,6 @@
 //! What untangling minimises.
 
-use crate::fem::element::{self, Element, P2};
-use crate::fem::jacobian::P2Nodes;
+use crate::fem::element::{self, Element, P2, P2Nodes};
 use crate::mesh::TriangleShape;
 use crate::topology::FaceId;
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::fem::jacobian::P2Nodes;
+use crate::fem::element::P2Nodes;
 use crate::map::boundary::{Boundary, Mids};
 use crate::map::linear::{flatten_ear_arcs, linear_map};
 use crate::map::quadratic::{energy, quadratic_map};

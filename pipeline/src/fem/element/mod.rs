@@ -11,7 +11,7 @@ use crate::fem::quadrature::Rule;
 use crate::fem::stiffness::stiffness_by_quadrature;
 use crate::mesh::TriangleShape;
 pub use p1::P1;
-pub use p2::P2;
+pub use p2::{P2, P2Nodes};
 
 /// Barycentric coordinates: shares of the three corners, which sum to 1.
 pub type Barycentric = [f64; 3];

@@ -3,6 +3,9 @@
 use super::{Barycentric, Element};
 use crate::mesh::TriangleShape;
 
+/// Points of the plane at the six nodes.
+pub type P2Nodes = [[f64; 2]; 6];
+
 /// The quadratic triangle with 6 nodes.
 #[derive(Clone, Copy, Debug)]
 pub struct P2;
