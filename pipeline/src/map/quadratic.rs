@@ -122,13 +122,8 @@ pub fn energy(chart: &FilledChart, nodes: &[GridPoint]) -> f64 {
 }
 
 fn energy_of(chart: &FilledChart, uv: &[[f64; 2]]) -> f64 {
-    energies(chart, uv).sum()
-}
-
-/// The Dirichlet energy of every triangle of the filled chart; of `uv`, only those of its nodes are used.
-pub(crate) fn energies(chart: &FilledChart, uv: &[[f64; 2]]) -> impl Iterator<Item = f64> {
-    let one = |f: usize| element::energy(&P2::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| uv[n]));
-    (0..chart.triangles().len()).map(one)
+    let of_face = |f: usize| element::energy(&P2::stiffness(&chart.shapes()[f]), &chart.nodes(f).map(|n| uv[n]));
+    (0..chart.triangles().len()).map(of_face).sum()
 }
 
 #[cfg(test)]
