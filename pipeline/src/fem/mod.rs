@@ -12,7 +12,6 @@ pub mod assembly;
 pub mod bernstein;
 pub mod dofs;
 pub mod element;
-pub(crate) mod elimination;
 pub mod geometry;
 pub(crate) mod jacobian;
 pub(crate) mod laplace;

@@ -5,8 +5,8 @@
 //! take part in the linear and quadratic solves, which keeps holes round and most triangles valid; they are no
 //! part of the result.
 
+use super::elimination;
 use crate::atlas::Chart;
-use crate::fem::elimination;
 use crate::mesh::TriangleShape;
 use crate::topology::EdgeTable;
 use crate::topology::{HalfEdgeId, VertexId};

@@ -1,6 +1,7 @@
 //! Maps of charts to the plane: linear, quadratic, and those with a boundary of their own.
 
 pub mod boundary;
+mod elimination;
 pub mod filled;
 pub mod linear;
 pub mod natural;

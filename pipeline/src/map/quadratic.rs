@@ -5,10 +5,10 @@
 //! metric is constant. The map minimises the Dirichlet energy among all quadratic maps with these boundary
 //! values; it need not be valid, and typically a few triangles in a thousand are not.
 
+use super::elimination;
 use crate::fem::bernstein::{self, JacobianBezier, Validity};
 use crate::fem::dofs::Dofs;
 use crate::fem::element::{self, Element, P2};
-use crate::fem::elimination;
 use crate::fem::jacobian::CornerDerivatives;
 use crate::fem::laplace;
 use crate::fem::sparse;
