@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 /// Turns poor surface triangulations into certified one-to-one quadratic maps.
 ///
-/// Exit codes: 0 all certified; 1 at least one input refused or failed (the others are done all the same);
-/// 2 wrong usage.
+/// Exit codes: 0 all certified; 1 at least one input, or a component of one, refused or failed (the others are done all the
+/// same); 2 wrong usage.
 #[derive(Debug, Parser)]
 #[command(name = "planish", version, max_term_width = 100)]
 pub struct Cli {

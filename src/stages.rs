@@ -14,7 +14,7 @@ use planish_core::map::linear;
 use planish_core::mesh::{SurfaceMesh, TriangleSoup};
 use planish_core::monitor::{Interrupted, Monitor, NoMonitor};
 use planish_core::repair::{self, Accepted, Repaired, repair};
-use planish_core::{CertifiedAtlas, CertifiedChart, ChartError, ChartJob, MapError, MappedChart, Plan, decompose};
+use planish_core::{CertifiedAtlas, CertifiedChart, ChartError, ChartJob, Error, MapError, MappedChart, Plan};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// The files of a result: names and contents.
@@ -43,7 +43,7 @@ pub fn repaired(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Re
 fn not_repaired(error: &repair::Error) -> Reason {
     match error {
         repair::Error::OnlyDegenerate { .. } => Reason::new(Code::OnlyDegenerate, error),
-        repair::Error::VolumeElements { vertices, .. } => {
+        repair::Error::VolumeElements { vertices, .. } | repair::Error::SheetsTogether { vertices, .. } => {
             Reason::at(Code::VolumeElements, error, Some(format!("vertices {vertices:?} after welding")))
         }
     }
@@ -74,16 +74,23 @@ pub fn plan(
     let Accepted { mesh, refused } = found.accepted().map_err(|e| not_repaired(&e))?;
     let refused: Vec<RefusedComponent> = refused.iter().map(refusal).collect();
     for component in &refused {
-        tracing::warn!("component {} is refused: {}", component.component, component.reason.message);
+        tracing::warn!(
+            code = component.reason.code.name(),
+            triangles = component.triangles,
+            first_triangle = component.first_triangle,
+            "component {} is refused: {}",
+            component.component,
+            component.reason.message
+        );
     }
     let plan = Plan::new(mesh, &settings.core(), monitor).map_err(not_cut)?;
     Ok((plan, refused))
 }
 
-fn not_cut(error: decompose::Error) -> Abort {
+fn not_cut(error: Error) -> Abort {
     match error {
-        decompose::Error::Interrupted(_) => Abort::Unwanted,
-        fault @ decompose::Error::Illegal(_) => internal(fault).into(),
+        Error::Interrupted(_) => Abort::Unwanted,
+        fault => internal(fault).into(),
     }
 }
 
@@ -112,7 +119,7 @@ fn not_mapped(error: ChartError) -> Abort {
         ChartError::Interrupted(_) => return Abort::Unwanted,
         ChartError::Map(MapError::Linear(linear::Error::Solver(sparse::Unsolvable::TooLarge { .. }))) => Code::TooLarge,
         ChartError::Map(_) => Code::NeedsSplit,
-        ChartError::Split(_) => Code::Internal,
+        ChartError::Split(_) | ChartError::Setting(_) => Code::Internal,
     };
     Reason::new(code, error).into()
 }

@@ -129,6 +129,13 @@ pub fn terrain_beside_a_volume() -> (Vec<u8>, usize, usize) {
     (stl(&all), surface.len(), block.len())
 }
 
+/// A file of these bytes.
+fn inputs_with(folder: &tempfile::TempDir, bytes: &[u8]) -> std::path::PathBuf {
+    let path = folder.path().join("mixed.stl");
+    std::fs::write(&path, bytes).expect("written");
+    path
+}
+
 #[test]
 fn a_component_that_cannot_be_processed_is_refused_alone() {
     let (bytes, of_surface, of_block) = terrain_beside_a_volume();
@@ -144,13 +151,24 @@ fn a_component_that_cannot_be_processed_is_refused_alone() {
     // The result is proven again, and is no less than it says.
     let folder = out.of("mixed.stl");
     assert_eq!(planish(["check".as_ref(), folder.as_os_str()]).code, Some(0));
+    let told = planish(["status".as_ref(), "--out".as_ref(), out.path().as_os_str(), "--json".as_ref()]);
+    let told: Value = serde_json::from_str(&told.out).expect("JSON");
+    assert_eq!((&told["refusals"][0]["name"], &told["results"]["certified"]), (&"mixed.stl".into(), &1.into()));
+    let table = out.run(&[&inputs_with(&inputs, &bytes)], &[]).out;
+    assert!(table.contains("certified, 1 component refused (up to date)"), "{table}");
+    // A report that hides how much is missing is found out.
+    let honest = std::fs::read_to_string(folder.join("report.json")).expect("text");
+    let forged = honest.replacen(&format!("\"triangles\": {of_block}"), "\"triangles\": 1", 1);
+    assert_ne!(forged, honest, "the twin is forged");
+    std::fs::write(folder.join("report.json"), forged).expect("written");
+    assert_eq!(planish(["check".as_ref(), folder.as_os_str()]).code, Some(1));
+    std::fs::write(folder.join("report.json"), honest).expect("written");
     // Alone, the surface gets the same charts.
     let (_, alone) = out.run_bytes("alone.stl", &stl(&terrain([0.0; 2], hills)));
     let sizes = |r: &Report| r.charts.iter().map(|c| c.triangles).collect::<Vec<_>>();
     assert_eq!(sizes(&alone), sizes(&report));
     // It is told beforehand, too.
-    let path = inputs.path().join("mixed.stl");
-    std::fs::write(&path, &bytes).expect("written");
+    let path = inputs_with(&inputs, &bytes);
     let told = planish(["info".as_ref(), path.as_os_str(), "--json".as_ref()]);
     assert_eq!(told.code, Some(1));
     let told: Value = serde_json::from_str(&told.out).expect("JSON");

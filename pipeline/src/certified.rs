@@ -15,6 +15,22 @@ use crate::topology::{ChartId, FaceId};
 use crate::untangle;
 
 /// A chart with its certified map, the account of how that was found, and how much it distorts.
+///
+/// ```
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{Settings, parametrize, shapes};
+///
+/// let atlas = parametrize(&shapes::disk(6), &Settings::default(), &NoMonitor)?;
+/// let certified = &atlas.charts()[0];
+/// // The nodes of the map: the vertices of the chart, then the middles of its edges.
+/// let (chart, map) = (certified.chart(), certified.map().map());
+/// assert_eq!(map.nodes.len(), chart.points().len() + chart.edges().len());
+/// // Its boundary lies on the unit circle.
+/// let on_rim = chart.from(chart.outer()[0]);
+/// let [u, v] = map.nodes[on_rim.index()].uv();
+/// assert!((u.hypot(v) - 1.0).abs() < 1e-15);
+/// # Ok::<(), planish_core::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct CertifiedChart {
     chart: Chart,
@@ -77,7 +93,7 @@ impl CertifiedChart {
         &self.chart
     }
 
-    /// The number of the chart in its atlas.
+    /// The number of the chart in its atlas. Before it is gathered, parts of one chart have the number of that.
     pub fn id(&self) -> ChartId {
         self.chart.id()
     }
@@ -140,7 +156,7 @@ pub struct CertifiedAtlas {
 /// Why charts make no atlas of a surface.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GatherError {
-    /// A chart is no chart of this surface.
+    /// A chart is no chart of this surface: a triangle has other vertices, or lies elsewhere.
     #[error("triangle {face} of part {part} is no triangle of this surface: the part was made from another one")]
     Foreign {
         /// The position of the chart among those given.
@@ -172,6 +188,24 @@ impl CertifiedAtlas {
     /// Puts the charts of `mesh` together and numbers them in this order; finds the curves between them, for a mesh with
     /// edges of length `size` (see [`crate::Settings::size`]).
     ///
+    /// ```
+    /// use planish_core::monitor::NoMonitor;
+    /// use planish_core::{CertifiedAtlas, Plan, Settings, repair, shapes};
+    ///
+    /// let settings = Settings::default();
+    /// let mesh = repair(&shapes::sphere(8), &settings.repair)?.accepted()?.mesh;
+    /// let Plan { mesh, jobs, .. } = Plan::new(mesh, &settings, &NoMonitor)?;
+    /// // Jobs know nothing of each other, nor of the surface: here they are done from the last to the first.
+    /// let mut certified = Vec::new();
+    /// for job in jobs.into_iter().rev() {
+    ///     certified.push(job.run(&NoMonitor)?);
+    /// }
+    /// certified.reverse();
+    /// let atlas = CertifiedAtlas::gather(mesh, certified.concat(), settings.size)?;
+    /// assert!(atlas.charts().iter().zip(0..).all(|(chart, id)| chart.id().0 == id));
+    /// # Ok::<(), planish_core::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// [`GatherError`]: together they do not hold every triangle of `mesh` once.
     pub fn gather(mesh: SurfaceMesh, charts: Vec<CertifiedChart>, size: Option<f64>) -> Result<Self, GatherError> {
@@ -193,7 +227,7 @@ impl CertifiedAtlas {
     }
 
     /// The same, beside which these components were refused.
-    pub fn without(self, refused: Vec<RefusedComponent>) -> Self {
+    pub(crate) fn beside(self, refused: Vec<RefusedComponent>) -> Self {
         Self { refused, ..self }
     }
 
@@ -216,6 +250,11 @@ impl CertifiedAtlas {
     pub fn seams(&self) -> &SeamNetwork {
         &self.seams
     }
+
+    /// The surface and its charts, for those who go on with them.
+    pub fn into_parts(self) -> (SurfaceMesh, Vec<CertifiedChart>) {
+        (self.mesh, self.charts)
+    }
 }
 
 /// A place is narrow if it is narrower than this share of an edge. Corners of the shape that are nearer together are not
@@ -228,7 +267,9 @@ fn owners(mesh: &SurfaceMesh, charts: &[CertifiedChart]) -> Result<Vec<Option<us
     for (part, chart) in charts.iter().map(CertifiedChart::chart).enumerate() {
         for (local, &face) in chart.faces().iter().enumerate() {
             let corners = chart.triangles()[local].map(|v| chart.vertices()[v.index()]);
-            if mesh.triangles().get(face.index()) != Some(&corners) {
+            let is_here = mesh.triangles().get(face.index()) == Some(&corners)
+                && mesh.corners(face.index()) == chart.corners(local);
+            if !is_here {
                 return Err(GatherError::Foreign { part, face });
             }
             if let Some(first) = owners[face.index()].replace(part) {

@@ -24,7 +24,7 @@
 //! [`parametrize()`] goes all the way; each step can be taken on its own.
 //!
 //! 1. [`repair()`] turns a [`TriangleSoup`](mesh::TriangleSoup) into a [`SurfaceMesh`](mesh::SurfaceMesh): welded, oriented,
-//!    with mollified edge lengths.
+//!    with mollified edge lengths; [`Repaired::accepted`](repair::Repaired::accepted) leaves out what no atlas can be made of.
 //! 2. [`Plan::new`] cuts the surface into [`Chart`](atlas::Chart)s ([`decompose()`]): parts that a disk, perhaps with holes,
 //!    can carry. Each becomes a [`ChartJob`], which needs nothing but itself.
 //! 3. [`ChartJob::map`] makes the [`linear`](map::linear) map, which does not fold, and the harmonic
@@ -42,8 +42,9 @@
 //! * Whatever survives decomposition gets a map, unless a single triangle needs more than the resolution of doubles; then
 //!   the error says so.
 //! * Results depend on nothing but the arguments: there is no clock, no thread, no random number and no file in this crate.
-//! * Whatever can take long asks a [`Monitor`](monitor::Monitor) many times a second whether to continue, and reserves
-//!   memory from it before it factorises. What was interrupted has no value.
+//! * What takes longest (cutting, mapping, untangling) asks a [`Monitor`](monitor::Monitor) again and again whether to
+//!   continue, and reserves memory from it before it factorises. What was interrupted has no value. A single factorisation
+//!   or proof of a chart is one step; repair, gathering and subdividing, which are linear or nearly so, are not asked.
 //!
 //! # What is not
 //!
@@ -82,5 +83,5 @@ pub use certified::{CertifiedAtlas, CertifiedChart};
 pub use decompose::decompose;
 pub use parametrize::{ChartError, ChartJob, Error, MapError, MappedChart, Plan, parametrize, parametrize_surface};
 pub use repair::repair;
-pub use settings::{ChartSettings, Order, Settings};
+pub use settings::{ChartSettings, Order, OutOfRange, Settings};
 pub use subdivide::subdivide;

@@ -2,7 +2,7 @@
 
 use crate::input::{Folder as Siblings, read_file};
 use crate::outcome::{Code, Reason, Status};
-use crate::report::{Input, Output, Report, SCHEMA, VERSION};
+use crate::report::{Input, Output, RefusedComponent, Report, SCHEMA, VERSION};
 use crate::result_files;
 use crate::settings::Settings;
 use crate::system::disk::{Disk, File, Folder, System};
@@ -70,6 +70,9 @@ pub struct Entry {
     pub status: Status,
     /// Why, where it is not certified.
     pub reason: Option<Reason>,
+    /// Components that are not in the result, where it is.
+    #[serde(default)]
+    pub refused_components: Vec<RefusedComponent>,
 }
 
 /// All results in the output folder `out`: their names and what their reports say, in the order of names.

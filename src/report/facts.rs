@@ -72,23 +72,36 @@ impl Facts {
     /// The report of an input for which there are no maps yet: all that is known, and no result.
     pub fn report(self, settings: &Settings) -> Report {
         let report = Report { content: self.content, ..Report::new(self.input, settings) };
-        let Some(SurfaceFacts { surface, repairs, warnings, decomposition, .. }) = self.surface else { return report };
-        Report { surface: Some(surface), repairs: Some(repairs), warnings, decomposition, ..report }
+        let Some(SurfaceFacts { surface, repairs, warnings, refused, decomposition }) = self.surface else {
+            return report;
+        };
+        Report {
+            surface: Some(surface),
+            repairs: Some(repairs),
+            warnings,
+            refused_components: refused,
+            decomposition,
+            ..report
+        }
     }
 
     /// The report of an input that is certified, but for components that are refused.
     pub fn certified(self, settings: &Settings, certified: CertifiedFacts) -> Report {
-        let refused_components = self.surface.as_ref().map_or(vec![], |s| s.refused.clone());
         let CertifiedFacts { charts, charts_by_splitting, seams, hand_off, outputs } = certified;
         let report = self.report(settings);
         let decomposition = report.decomposition.map(|d| Decomposition { charts_by_splitting, ..d });
         let status = Status::Certified;
-        Report { status, refused_components, decomposition, charts, seams, hand_off, outputs, ..report }
+        Report { status, decomposition, charts, seams, hand_off, outputs, ..report }
     }
 
     /// The report of an input that is refused, or failed, for this reason.
     pub fn stopped(self, settings: &Settings, reason: Reason) -> Report {
-        Report { status: reason.status(), reason: Some(reason), ..self.report(settings) }
+        let mut facts = self;
+        if let Some(surface) = &mut facts.surface {
+            // How many charts there would have been is not known to its end.
+            surface.decomposition = None;
+        }
+        Report { status: reason.status(), reason: Some(reason), ..facts.report(settings) }
     }
 }
 

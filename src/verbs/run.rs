@@ -125,7 +125,15 @@ fn table(rows: &[Row]) -> Table {
 
 fn cells(name: String, done: &Done) -> Vec<String> {
     let report = &done.report;
-    let status = if done.up_to_date { format!("{} (up to date)", report.status) } else { report.status.to_string() };
+    let mut status = report.status.to_string();
+    match report.refused_components.len() {
+        0 => {}
+        1 => status += ", 1 component refused",
+        several => status += &format!(", {several} components refused"),
+    }
+    if done.up_to_date {
+        status += " (up to date)";
+    }
     let some = |count: usize| if report.charts.is_empty() { String::new() } else { count.to_string() };
     let invalid = report.charts.iter().filter_map(|c| c.quadratic.as_ref()).map(|q| q.invalid).sum();
     let mut methods: Vec<&str> =

@@ -6,6 +6,7 @@ use crate::operating::health::{self, Health};
 use crate::operating::status::{self, Counts, Noted, Progress, Refusal, Status};
 use crate::outcome::Status as Outcome;
 use crate::output::ledger;
+use crate::report::RefusedComponent;
 use crate::settings::Settings;
 use serde::Serialize;
 use std::path::Path;
@@ -22,7 +23,7 @@ struct Answer {
     daemon: Option<Status>,
     /// All results in the output folder.
     results: Counts,
-    /// Those that are not certified.
+    /// Those that are not certified, and the components that are not in a result.
     refusals: Vec<Refusal>,
     /// Whether an operator must act.
     health: Health,
@@ -53,12 +54,26 @@ fn answer(out: &Path, running: bool, daemon: Option<Status>, health: Health) -> 
     let mut refusals = Vec::new();
     for (name, entry) in ledger::entries(out) {
         results.count(entry.status);
+        refusals.extend(entry.refused_components.iter().map(|refused| not_in_result(&name, refused)));
         if entry.status != Outcome::Certified {
             let (code, message) = entry.reason.map_or((None, String::new()), |r| (Some(r.code), r.message));
             refusals.push(Refusal { name: name.to_string_lossy().into_owned(), status: entry.status, code, message });
         }
     }
     Answer { running, daemon, results, refusals, health }
+}
+
+fn not_in_result(name: &Path, refused: &RefusedComponent) -> Refusal {
+    let RefusedComponent { component, triangles, first_triangle, reason } = refused;
+    Refusal {
+        name: name.to_string_lossy().into_owned(),
+        status: Outcome::Certified,
+        code: Some(reason.code),
+        message: format!(
+            "without component {component}, of {triangles} triangles from triangle {first_triangle} on: {}",
+            reason.message
+        ),
+    }
 }
 
 /// The answer for people.

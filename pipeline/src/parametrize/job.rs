@@ -13,7 +13,7 @@ use crate::map::linear::{self, LinearMap, flatten_ear_arcs, linear_map};
 use crate::map::quadratic::{QuadraticMap, min_det, quadratic_map};
 use crate::measure::distortion;
 use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
-use crate::settings::{ChartSettings, Order};
+use crate::settings::{ChartSettings, Order, OutOfRange};
 use crate::untangle::{Dirichlet, Untangled, untangle};
 
 /// A chart that is to be mapped, and what its map depends on: a value of its own, which needs neither the surface nor the
@@ -47,8 +47,8 @@ pub(super) struct Maps {
 
 impl Maps {
     /// The conformal distortion that 99 % of the area does not exceed: for charts with holes in the harmonic map, where
-    /// there is one (untangling changes it little, and takes long where it is large), for others in the raised linear
-    /// map. Noise makes many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
+    /// there is one (untangling changes it little, and takes long where it is large), for others in the linear map, its degree
+    /// elevated. Noise makes many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
     pub(super) fn conformal_p99(&self, chart: &Chart) -> f64 {
         let nodes = match &self.harmonic {
             Some(Ok(map)) if !chart.holes().is_empty() => map.nodes(),
@@ -64,7 +64,7 @@ pub enum MapError {
     /// No linear map.
     #[error(transparent)]
     Linear(linear::Error),
-    /// The raised linear map is not one-to-one in double precision.
+    /// The linear map, its degree elevated, is not one-to-one in double precision.
     #[error("the chart is too distorted for one map: {0}; it must be split")]
     Start(certify::Error),
     /// The map stretches too much.
@@ -105,6 +105,7 @@ impl ChartJob {
     /// [`ChartError`].
     pub fn map(self, monitor: &dyn Monitor) -> Result<Vec<MappedChart>, ChartError> {
         let settings = self.settings;
+        settings.check()?;
         let cutter = Cutter { settings: &settings, monitor };
         let mut mapped = Vec::new();
         let mut waiting = vec![self.chart];
@@ -195,6 +196,9 @@ pub fn parametrize_chart(chart: Chart, order: Order) -> Result<CertifiedChart, M
 /// Why a chart has no map, split or not.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ChartError {
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Setting(#[from] OutOfRange),
     /// A single triangle does not map.
     #[error(transparent)]
     Map(MapError),
@@ -269,7 +273,7 @@ pub(super) fn map_within(
 }
 
 /// A chart whose linear map is above the largest area ratio by this factor is split at once. Below it the harmonic map
-/// is asked, too, as slivers stretch linear maps more: a ratio is foretold, halfway between those of both. That is
+/// is asked, too, as slivers stretch linear maps more: a ratio is predicted, halfway between those of both. That is
 /// right within a decade mostly, and saves untangling; what decides is the certified map.
 const HOPELESS: f64 = 10.0;
 

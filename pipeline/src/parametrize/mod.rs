@@ -2,7 +2,7 @@
 //!
 //! [`parametrize`] is the whole way. Its pieces are there for those who do them elsewhere, at the same time, or one by one:
 //!
-//! 1. [`crate::repair()`] makes a surface;
+//! 1. [`crate::repair()`] makes a surface, and [`Repaired::accepted`](repair::Repaired::accepted) leaves out what is none;
 //! 2. [`Plan::new`] cuts it into charts, and makes a [`ChartJob`] of each;
 //! 3. [`ChartJob::map`] makes the linear and the harmonic map, and splits charts that one map does not suit;
 //! 4. [`MappedChart::untangle`] makes the harmonic map valid, and proves it one-to-one;
@@ -16,7 +16,7 @@ use crate::decompose::{self, Illegal, decompose, split_ears};
 use crate::mesh::{SurfaceMesh, TriangleSoup};
 use crate::monitor::{Interrupted, Monitor};
 use crate::repair::{self, Accepted, repair};
-use crate::settings::Settings;
+use crate::settings::{OutOfRange, Settings};
 pub use job::{ChartError, ChartJob, MapError, MappedChart, parametrize_chart};
 
 /// Repairs a soup, cuts it into charts, and maps these; each map is proven to be one-to-one. Components that cannot be
@@ -34,8 +34,9 @@ pub use job::{ChartError, ChartJob, MapError, MappedChart, parametrize_chart};
 /// # Errors
 /// [`Error`].
 pub fn parametrize(soup: &TriangleSoup, settings: &Settings, monitor: &dyn Monitor) -> Result<CertifiedAtlas, Error> {
+    settings.check()?;
     let Accepted { mesh, refused } = repair(soup, &settings.repair)?.accepted()?;
-    Ok(parametrize_surface(mesh, settings, monitor)?.without(refused))
+    Ok(parametrize_surface(mesh, settings, monitor)?.beside(refused))
 }
 
 /// As [`parametrize`], for a surface that is repaired already.
@@ -58,6 +59,9 @@ pub fn parametrize_surface(
 /// Why there is no atlas of a soup.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
+    /// A setting is out of its range.
+    #[error(transparent)]
+    Setting(#[from] OutOfRange),
     /// There is no surface.
     #[error(transparent)]
     Repair(#[from] repair::Error),
@@ -88,6 +92,7 @@ impl From<ChartError> for Error {
     fn from(error: ChartError) -> Self {
         match error {
             ChartError::Interrupted(interrupted) => interrupted.into(),
+            ChartError::Setting(setting) => setting.into(),
             error => Self::Chart(error),
         }
     }
@@ -111,8 +116,9 @@ impl Plan {
     /// Cuts a surface into charts.
     ///
     /// # Errors
-    /// [`decompose::Error`].
-    pub fn new(mesh: SurfaceMesh, settings: &Settings, monitor: &dyn Monitor) -> Result<Self, decompose::Error> {
+    /// [`Error::Setting`], [`Error::Illegal`], [`Error::Interrupted`].
+    pub fn new(mesh: SurfaceMesh, settings: &Settings, monitor: &dyn Monitor) -> Result<Self, Error> {
+        settings.check()?;
         let atlas = decompose(&mesh, &settings.decompose, monitor)?;
         let without_ears = split_ears(&mesh, &atlas, settings.decompose.max_triangles)?;
         let (mesh, atlas, ears_split) = match without_ears {

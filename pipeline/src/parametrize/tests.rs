@@ -105,6 +105,13 @@ fn charts_that_do_not_hold_every_triangle_once_are_no_atlas() {
     let other = parametrize(&shapes::sphere(9), &Settings::default(), &NoMonitor).expect("an atlas");
     let foreign = gather(&[&charts[..1], &other.charts()[1..]].concat()).expect_err("of another surface");
     assert!(matches!(foreign, GatherError::Foreign { part: 1, .. }), "{foreign}");
+    // Of a surface with the same triangles that lies elsewhere.
+    let soup = shapes::sphere(6);
+    let flattened = soup.points().iter().map(|[x, y, z]| [*x, *y, 0.5 * z]).collect();
+    let flattened = TriangleSoup::new(flattened, soup.triangles().to_vec()).expect("sound");
+    let flattened = repair(&flattened, &Default::default()).expect("a surface").mesh;
+    let moved = CertifiedAtlas::gather(flattened, charts.to_vec(), None).expect_err("of another surface");
+    assert!(matches!(moved, GatherError::Foreign { .. }), "{moved}");
 }
 
 #[test]
@@ -112,4 +119,8 @@ fn the_reason_why_there_is_no_atlas_is_kept() {
     let flat = TriangleSoup::new(vec![[0.0; 3], [1.0, 0.0, 0.0]], vec![[0, 1, 1]]).expect("sound");
     let error = parametrize(&flat, &Settings::default(), &NoMonitor).expect_err("nothing is left");
     assert!(matches!(error, Error::Repair(repair::Error::OnlyDegenerate { .. })), "{error}");
+    let mut settings = Settings::default();
+    settings.decompose.max_triangles = 0;
+    let error = parametrize(&shapes::sphere(4), &settings, &NoMonitor).expect_err("no chart has no triangle");
+    assert!(matches!(error, Error::Setting(_)), "{error}");
 }

@@ -138,6 +138,22 @@ pub enum Error {
         /// The first vertices (after welding) at which sheets meet.
         vertices: Vec<u32>,
     },
+    /// All components together have more sheets than anybody wants charts, and this one has the smallest.
+    #[error(
+        "it has {sheets} sheets more than one in {triangles} triangles, and with the other components there are {in_all} (at \
+         most {MAX_SHEETS} in all, or {MAX_TINY_SHEETS} of fewer than {TINY_SHEET} triangles on average); export the boundaries \
+         of volumes only, or fewer parts at once"
+    )]
+    SheetsTogether {
+        /// How many sheets this component has beyond one.
+        sheets: usize,
+        /// How many triangles it has.
+        triangles: usize,
+        /// How many sheets all components have beyond one each.
+        in_all: usize,
+        /// The first vertices (after welding) at which its sheets meet.
+        vertices: Vec<u32>,
+    },
 }
 
 /// Triangles on their way through repair: each with its position in the input.

@@ -1,14 +1,15 @@
 //! Is a surface worth an atlas? Faces of volume elements are none: non-manifold edges cut them into sheets of one or two
 //! triangles, each of which would be a chart.
 //!
-//! A file may hold such faces beside a surface. So each *component* is judged: what is connected through edges, also those of
-//! three and more triangles. Of those with the most sheets so many are refused that the rest is few enough.
+//! A file may hold such faces beside a surface. So each *component* (what is connected through edges, also those of three and
+//! more triangles) is measured by its own sheets and triangles, and refused alone where it has too many. Only then all others
+//! are counted together; where that is too much, those with the fewest triangles a sheet are refused, until it is not.
 
 use super::{Error, Repaired, pinned_vertices};
 use crate::mesh::{Sheets, SurfaceMesh};
 use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Sheets that non-manifold edges may cut a surface into. Each is a chart at least: the 6480 of the faces of all tetrahedra
 /// in a grid of 8 x 8 x 8 cubes take 8 seconds, and the cost grows with the square of their number.
@@ -48,12 +49,12 @@ pub struct Accepted {
 }
 
 impl Repaired {
-    /// The components of which no atlas can be made.
+    /// The components of which no atlas can be made, in the order of their numbers.
     ///
     /// # Errors
     /// [`Error::VolumeElements`], where no other is left.
     pub fn refused(&self) -> Result<Vec<RefusedComponent>, Error> {
-        Ok(self.judged()?.refused)
+        Ok(self.selection()?.refused)
     }
 
     /// The surface without the components of which no atlas can be made.
@@ -61,39 +62,42 @@ impl Repaired {
     /// # Errors
     /// [`Error::VolumeElements`], where no other is left.
     pub fn accepted(self) -> Result<Accepted, Error> {
-        let Judged { kept, nonmanifold_edges, refused } = self.judged()?;
+        let Selection { kept, nonmanifold_edges, refused } = self.selection()?;
         let Some(kept) = kept else { return Ok(Accepted { mesh: self.mesh, refused }) };
         let mesh = self.mesh.restricted(&kept);
         let nonmanifold_vertices = pinned_vertices(mesh.welded(), mesh.triangles(), mesh.edges());
         Ok(Accepted { mesh: mesh.of_sheets(Sheets { nonmanifold_edges, nonmanifold_vertices }), refused })
     }
 
-    fn judged(&self) -> Result<Judged, Error> {
+    fn selection(&self) -> Result<Selection, Error> {
         let summary = self.mesh.topology_summary();
-        let sheets = summary.components.saturating_sub(self.raw.components);
-        if !are_too_many(sheets, summary.triangles) {
-            let nonmanifold_edges = summary.nonmanifold_edges;
-            return Ok(Judged { kept: None, nonmanifold_edges, refused: vec![] });
+        let all = Selection { kept: None, nonmanifold_edges: summary.nonmanifold_edges, refused: vec![] };
+        // With as few parts none is cut into too many; nearly all surfaces end here.
+        if summary.components <= MAX_TINY_SHEETS {
+            return Ok(all);
         }
         let components = Components::new(&self.mesh);
         let refused = components.refused();
+        if refused.is_empty() {
+            return Ok(all);
+        }
         if refused.len() == components.all.len() {
             let vertices = self.report.split_vertices.first.clone();
             let (triangles, nonmanifold_edges) = (summary.triangles, summary.nonmanifold_edges);
+            let sheets = components.all.iter().map(Component::sheets_beyond).sum();
             return Err(Error::VolumeElements { sheets, triangles, nonmanifold_edges, vertices });
         }
-        let is_kept = |f: &usize| !refused.contains(&components.of_face[*f]);
+        let is_kept = |f: &usize| !refused.contains_key(&components.of_face[*f]);
         let kept = (0..components.of_face.len()).filter(is_kept).map(FaceId::at).collect();
-        let is_kept = |(number, _): &(usize, &Component)| !refused.contains(number);
-        let nonmanifold_edges =
-            components.all.iter().enumerate().filter(is_kept).map(|(_, c)| c.nonmanifold_edges).sum();
-        let refused = refused.iter().map(|number| components.refusal(*number, &self.mesh)).collect();
-        Ok(Judged { kept: Some(kept), nonmanifold_edges, refused })
+        let of_kept = components.all.iter().enumerate().filter(|(number, _)| !refused.contains_key(number));
+        let nonmanifold_edges = of_kept.map(|(_, component)| component.nonmanifold_edges).sum();
+        let refused = refused.iter().map(|(number, why)| components.refusal(*number, *why, &self.mesh)).collect();
+        Ok(Selection { kept: Some(kept), nonmanifold_edges, refused })
     }
 }
 
 /// Which faces are worth an atlas (all, where none are named), and which components are not.
-struct Judged {
+struct Selection {
     kept: Option<Vec<FaceId>>,
     /// Edges at which sheets of what is kept met.
     nonmanifold_edges: usize,
@@ -104,6 +108,15 @@ struct Judged {
 fn are_too_many(sheets: usize, triangles: usize) -> bool {
     let are_tiny = triangles < TINY_SHEET * sheets;
     sheets > if are_tiny { MAX_TINY_SHEETS } else { MAX_SHEETS }
+}
+
+/// Why a component is refused.
+#[derive(Clone, Copy)]
+enum Why {
+    /// It has too many sheets itself.
+    Alone,
+    /// With the others there are so many.
+    Together { in_all: usize },
 }
 
 /// The components of a surface.
@@ -121,6 +134,13 @@ struct Component {
     nonmanifold_edges: usize,
     /// The first welded vertices at which its sheets meet.
     vertices: BTreeSet<u32>,
+}
+
+impl Component {
+    /// Its sheets beyond the one that every component has.
+    fn sheets_beyond(&self) -> usize {
+        self.sheets - 1
+    }
 }
 
 impl Components {
@@ -160,34 +180,41 @@ impl Components {
         Self { of_face, all }
     }
 
-    /// The numbers of so many of the components with the most sheets that the others are few enough; ascending.
-    fn refused(&self) -> BTreeSet<usize> {
-        let beyond = |number: usize| self.all[number].sheets - 1;
-        let mut by_sheets: Vec<usize> = (0..self.all.len()).collect();
-        by_sheets.sort_by_key(|number| std::cmp::Reverse(beyond(*number)));
-        let mut sheets: usize = by_sheets.iter().map(|number| beyond(*number)).sum();
-        let mut triangles: usize = self.all.iter().map(|c| c.triangles).sum();
-        let mut refused = BTreeSet::new();
-        for number in by_sheets {
+    /// The components that are refused, and why.
+    fn refused(&self) -> BTreeMap<usize, Why> {
+        let is_too_many = |c: &Component| are_too_many(c.sheets_beyond(), c.triangles);
+        let alone = self.all.iter().enumerate().filter(|(_, component)| is_too_many(component));
+        let mut refused: BTreeMap<usize, Why> = alone.map(|(number, _)| (number, Why::Alone)).collect();
+        let mut left: Vec<usize> = (0..self.all.len()).filter(|number| !refused.contains_key(number)).collect();
+        // Those whose sheets are smallest last: they go first. Of such as are alike, the last one.
+        let of_sheet = |c: &Component| c.triangles as f64 / c.sheets as f64;
+        left.sort_by(|a, b| of_sheet(&self.all[*b]).total_cmp(&of_sheet(&self.all[*a])));
+        loop {
+            let sheets = left.iter().map(|number| self.all[*number].sheets_beyond()).sum();
+            let triangles = left.iter().map(|number| self.all[*number].triangles).sum();
+            // Ends: one component less each time, and one alone is not too many.
             if !are_too_many(sheets, triangles) {
-                break;
+                return refused;
             }
-            sheets -= beyond(number);
-            triangles -= self.all[number].triangles;
-            refused.insert(number);
+            if let Some(number) = left.pop() {
+                refused.insert(number, Why::Together { in_all: sheets });
+            }
         }
-        refused
     }
 
-    fn refusal(&self, number: usize, mesh: &SurfaceMesh) -> RefusedComponent {
-        let Component { sheets, triangles, first, nonmanifold_edges, ref vertices } = self.all[number];
-        let vertices = vertices.iter().copied().collect();
-        RefusedComponent {
-            component: number,
-            triangles,
-            first_triangle: first.map_or(0, |f| mesh.source_triangle(f.index())),
-            error: Error::VolumeElements { sheets: sheets - 1, triangles, nonmanifold_edges, vertices },
-        }
+    fn refusal(&self, number: usize, why: Why, mesh: &SurfaceMesh) -> RefusedComponent {
+        let component = &self.all[number];
+        let (sheets, triangles) = (component.sheets_beyond(), component.triangles);
+        let vertices = component.vertices.iter().copied().collect();
+        let error = match why {
+            Why::Alone => {
+                let nonmanifold_edges = component.nonmanifold_edges;
+                Error::VolumeElements { sheets, triangles, nonmanifold_edges, vertices }
+            }
+            Why::Together { in_all } => Error::SheetsTogether { sheets, triangles, in_all, vertices },
+        };
+        let first_triangle = component.first.map_or(0, |f| mesh.source_triangle(f.index()));
+        RefusedComponent { component: number, triangles, first_triangle, error }
     }
 }
 

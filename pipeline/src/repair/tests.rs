@@ -389,6 +389,75 @@ fn side_by_side(soups: &[TriangleSoup]) -> TriangleSoup {
     TriangleSoup::new(points, triangles).expect("sound")
 }
 
+/// Walls along the sides of n by n squares, each of `fine` by `fine` smaller ones: they meet in threes and fours, in sheets
+/// of many triangles.
+fn egg_crate(n: u32, fine: u32) -> TriangleSoup {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    let mut wall = |from: [f64; 2], to: [f64; 2]| {
+        let first = points.len() as u32;
+        for i in 0..=fine {
+            for j in 0..=fine {
+                let t = f64::from(i) / f64::from(fine);
+                let along = [0, 1].map(|k| from[k] + t * (to[k] - from[k]));
+                points.push([along[0], along[1], f64::from(j) / f64::from(fine)]);
+            }
+        }
+        for i in 0..fine {
+            for j in 0..fine {
+                let a = first + i * (fine + 1) + j;
+                let [b, c, d] = [a + fine + 1, a + fine + 2, a + 1];
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+    };
+    for i in 0..=n {
+        for j in 0..n {
+            let [x, y, z] = [i, j, j + 1].map(f64::from);
+            wall([x, y], [x, z]);
+            wall([y, x], [z, x]);
+        }
+    }
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+/// The components that are refused, and which of them for the sum alone.
+fn refused_of(soups: &[TriangleSoup]) -> (Vec<usize>, Vec<usize>) {
+    let refused = repaired(&side_by_side(soups)).accepted().expect("some are left").refused;
+    let together = refused.iter().filter(|r| matches!(r.error, Error::SheetsTogether { .. }));
+    (refused.iter().map(|r| r.component).collect(), together.map(|r| r.component).collect())
+}
+
+#[test]
+fn a_component_is_measured_by_itself_whatever_lies_beside_it() {
+    // Of 1,200 sheets of eight triangles: alone it is accepted.
+    let crate_of_walls = egg_crate(24, 2);
+    assert!(repaired(&crate_of_walls).mesh.topology_summary().components > 1_100);
+    assert!(repaired(&crate_of_walls).accepted().is_ok());
+    let (block, small, plain) = (faces_of_tetrahedra(6), faces_of_tetrahedra(4), shapes::sphere(60));
+    assert!(repaired(&block).accepted().is_err() && repaired(&small).accepted().is_ok());
+    // The block is refused beside the walls, and beside a surface of so many triangles that its own do not count.
+    assert_eq!(refused_of(&[crate_of_walls.clone(), block.clone()]), (vec![1], vec![]));
+    assert_eq!(refused_of(&[plain, block.clone()]), (vec![1], vec![]));
+    // Blocks that are few enough each are too many together: some of them go, and not what has large sheets.
+    let (refused, together) = refused_of(&[small.clone(), crate_of_walls, small.clone(), small.clone(), small]);
+    assert!(!refused.is_empty() && refused == together && !refused.contains(&1), "{refused:?}");
+}
+
+#[test]
+fn volume_elements_with_loose_corners_are_refused_all_the_same() {
+    let block = faces_of_tetrahedra(6);
+    // Every face has corners of its own, a little off: cracks are closed, and then they meet.
+    let jitter = |k: usize| 1e-7 * ((k * 7919 % 13) as f64 - 6.0);
+    let corners = block.triangles().iter().flatten().zip(0..);
+    let points = corners.map(|(v, k)| block.points()[*v as usize].map(|c| c + jitter(k))).collect();
+    let triangles = (0..block.triangles().len() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    let loose = repaired(&TriangleSoup::new(points, triangles).expect("sound"));
+    assert!(loose.report.cracks_closed > 1_000, "{:?}", loose.report);
+    let sheets = loose.mesh.topology_summary().components;
+    assert!(sheets > 1_000, "{sheets}: the test has lost its sense");
+    assert!(loose.accepted().is_err());
+}
+
 #[test]
 fn components_of_volume_elements_are_refused_alone() {
     let (sphere, volume, book) = (shapes::sphere(8), faces_of_tetrahedra(8), shapes::book(3, 4));

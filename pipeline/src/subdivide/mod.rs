@@ -161,6 +161,11 @@ impl LinearChart {
         &self.uv
     }
 
+    /// Per triangle, the triangle of the certified chart that it is a part of.
+    pub fn faces(&self) -> &[u32] {
+        &self.faces
+    }
+
     /// The triangles, by nodes of the chart, all turning left in the plane.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
@@ -183,6 +188,10 @@ impl LinearChart {
 pub fn subdivide(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<LinearAtlas, Error> {
     let mesh = atlas.mesh();
     assert_eq!(straight.len(), atlas.charts().len(), "an entry for every chart");
+    for (certified, straight) in atlas.charts().iter().zip(straight) {
+        let is_of_chart = straight.is_none_or(|map| map.map().cells == certified.map().map().cells);
+        assert!(is_of_chart, "the straight map of chart {} is that of another one", certified.id());
+    }
     refuse_self_contact(atlas.seams(), atlas.charts().len())?;
     let Split { nodes, charts, by, refined } = split(atlas, straight)?;
     let those = |which: &dyn Fn(HandedOver) -> bool| {
