@@ -39,10 +39,14 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Clone, Debug)]
 pub struct LinearAtlas {
     points: Vec<Vec3>,
+    /// Per point.
     curvatures: Vec<Principal>,
     charts: Vec<LinearChart>,
+    /// Per curve of the network, the points along it.
     curves: Vec<Vec<u32>>,
+    /// The charts that are handed over by the straight map that was given for them.
     straight: Vec<ChartId>,
+    /// The charts that are handed over by the map from which their untangling started, with arcs or with chords.
     linear: Vec<ChartId>,
     refined: usize,
     moved: usize,
@@ -51,9 +55,13 @@ pub struct LinearAtlas {
 /// One chart: a triangulation in space and in the plane.
 #[derive(Clone, Debug, Default)]
 pub struct LinearChart {
+    /// Per node of the chart, the point of the atlas.
     nodes: Vec<u32>,
+    /// Per node of the chart.
     uv: Vec<GridPoint>,
+    /// By nodes of the chart.
     triangles: Vec<[u32; 3]>,
+    /// Per triangle, the curved triangle of the chart that it is a part of.
     faces: Vec<u32>,
 }
 
