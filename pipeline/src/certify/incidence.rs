@@ -63,30 +63,34 @@ pub(super) fn boundary_loops(cells: &[[u32; 6]], nodes: usize) -> Result<Vec<Vec
     }
     check_nodes(cells, nodes)?;
     let sides = all_sides(cells, nodes);
+    // Per vertex, the arc of the boundary that begins there: its middle and where it ends.
     let mut out: Vec<Option<[u32; 2]>> = vec![None; nodes];
+    // Per node, the ends of the edge that it is the middle of.
     let mut middle_of: Vec<Option<[u32; 2]>> = vec![None; nodes];
     for edge in sides.chunk_by(|a, b| a.ends == b.ends) {
-        let [from, to] = edge[0].ends;
-        let error = IncidenceError::Edge { from, to, cell: FaceId(edge[0].cell) };
-        let role = &mut middle_of[edge[0].mid as usize];
-        if role.replace(edge[0].ends).is_some() {
-            return Err(IncidenceError::Role { node: edge[0].mid, cell: FaceId(edge[0].cell) });
+        let Side { ends: [from, to], mid, cell, .. } = edge[0];
+        let cell = FaceId(cell);
+        if middle_of[mid as usize].replace([from, to]).is_some() {
+            return Err(IncidenceError::Role { node: mid, cell });
         }
         match edge {
+            // One side alone is an arc of the boundary.
             [one] => {
                 let [a, b] = if one.forward { [from, to] } else { [to, from] };
                 if out[a as usize].replace([one.mid, b]).is_some() {
                     return Err(IncidenceError::Pinched { node: a });
                 }
             }
+            // Two sides agree on the middle, and run in opposite directions.
             [one, two] if one.mid == two.mid && one.forward != two.forward => {}
-            _ => return Err(error),
+            _ => return Err(IncidenceError::Edge { from, to, cell }),
         }
     }
     check_roles(cells, &middle_of)?;
     loops_of(out)
 }
 
+/// Every node exists, and no cell has one twice.
 fn check_nodes(cells: &[[u32; 6]], nodes: usize) -> Result<(), IncidenceError> {
     for (i, cell) in cells.iter().enumerate() {
         let mut sorted = *cell;
@@ -112,9 +116,11 @@ fn check_roles(cells: &[[u32; 6]], middle_of: &[Option<[u32; 2]>]) -> Result<(),
 fn all_sides(cells: &[[u32; 6]], nodes: usize) -> Vec<Side> {
     let side = |i: u32, cell: &[u32; 6], k: usize| {
         let (a, b) = (cell[k], cell[(k + 1) % 3]);
-        (a.min(b), Side { ends: [a.min(b), a.max(b)], forward: a < b, mid: cell[3 + k], cell: i })
+        let side = Side { ends: [a.min(b), a.max(b)], forward: a < b, mid: cell[3 + k], cell: i };
+        (side.ends[0], side)
     };
     let unsorted = || (0..).zip(cells).flat_map(|(i, c)| [0, 1, 2].map(|k| side(i, c, k)));
+    // By lower ends first: the few sides at each are sorted much faster than all together.
     let mut at_lower_end = Csr::sorted(nodes, unsorted);
     let mut sides = Vec::with_capacity(3 * cells.len());
     for node in 0..nodes {

@@ -51,7 +51,7 @@ pub struct Certificate {
     pub by_bounds: usize,
     /// Triangles proven by strict copositivity.
     pub by_exact: usize,
-    /// The depth of subdivision behind the bounds.
+    /// The depth of subdivision behind the bounds: how often the triangle that took most was quartered.
     pub depth: u32,
     /// A lower bound of the jacobian determinant (on the reference triangle of area 1/2) over all triangles.
     pub det_lower_bound: f64,
@@ -81,6 +81,36 @@ impl CertifiedMap {
 }
 
 /// Why a map is not proven.
+///
+/// # Example
+///
+/// Three triangles around the origin, and what is said of twins that are each wrong in one way.
+///
+/// ```
+/// use planish_core::certify::{Error, IncidenceError, PlanarMap, prove};
+/// use planish_core::grid::GridPoint;
+///
+/// let [a, b, c] = [[0.5, 0.0], [-0.5, 0.5], [-0.5, -0.5]].map(GridPoint::vertex);
+/// let o = GridPoint::default();
+/// let [ab, bc, ca] = [a.midpoint(b), b.midpoint(c), c.midpoint(a)];
+/// let nodes = vec![a, b, c, o, ab, bc, ca, a.midpoint(o), b.midpoint(o), c.midpoint(o)];
+/// let cells = vec![[0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [2, 0, 3, 6, 7, 9]];
+/// let map = PlanarMap { cells, nodes, hole_centres: vec![] };
+/// assert!(prove(map.clone()).is_ok());
+///
+/// let refused = |change: &dyn Fn(&mut PlanarMap)| {
+///     let mut twin = map.clone();
+///     change(&mut twin);
+///     prove(twin).expect_err("no proof")
+/// };
+/// // Vertices lie on multiples of 2^-52, two units of the grid: otherwise midpoints would be rounded.
+/// assert_eq!(refused(&|m| m.nodes[3].x += 1), Error::OffGrid { node: 3 });
+/// // Without the last triangle the origin lies on the boundary, which does not run around it.
+/// assert_eq!(refused(&|m| m.cells.truncate(2)), Error::OuterLoop { count: 0, loops: 1 });
+/// // A triangle that is there twice.
+/// let twice = refused(&|m| m.cells.push(m.cells[0]));
+/// assert!(matches!(twice, Error::Incidence(IncidenceError::Edge { from: 0, to: 1, .. })));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
     /// The cells are no surface with boundary.
@@ -168,17 +198,30 @@ pub fn prove(map: PlanarMap) -> Result<CertifiedMap, Error> {
         return Err(Error::OffGrid { node });
     }
     let mut certificate = prove_triangles(&map)?;
-    let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| l.iter().map(|a| arcs::arc_of(a, &map.nodes)).collect()).collect();
+    let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| arcs_of(l, &map.nodes)).collect();
+    // (c) Exactly one loop runs around the origin to the left.
     let origin = GridPoint::default();
-    let outer: Vec<usize> = (0..arcs.len()).filter(|i| arcs::winds_once(&arcs[*i], origin, 1)).collect();
-    let [outer] = outer[..] else { return Err(Error::OuterLoop { count: outer.len(), loops: loops.len() }) };
+    let around_origin: Vec<usize> = (0..arcs.len()).filter(|i| arcs::winds_once(&arcs[*i], origin, 1)).collect();
+    let [outer] = around_origin[..] else {
+        return Err(Error::OuterLoop { count: around_origin.len(), loops: loops.len() });
+    };
     certificate.outer_arcs = arcs[outer].len();
-    for (i, hole) in arcs.iter().enumerate().filter(|(i, _)| *i != outer) {
+    // (d) Any of the given centres will do for any hole: the theorem asks for one, not for a particular one.
+    for (i, hole) in arcs.iter().enumerate() {
+        if i == outer {
+            continue;
+        }
         let seen_from = map.hole_centres.iter().find(|c| arcs::winds_once(hole, **c, -1));
-        let centres = map.hole_centres.len();
-        certificate.hole_centres.push(*seen_from.ok_or(Error::Hole { node: loops[i][0][0], centres })?);
+        let Some(centre) = seen_from else {
+            return Err(Error::Hole { node: loops[i][0][0], centres: map.hole_centres.len() });
+        };
+        certificate.hole_centres.push(*centre);
     }
     Ok(CertifiedMap { map, certificate })
+}
+
+fn arcs_of(boundary_loop: &[incidence::ArcNodes], nodes: &[GridPoint]) -> Vec<Arc> {
+    boundary_loop.iter().map(|arc| arcs::arc_of(arc, nodes)).collect()
 }
 
 /// Everything is proven of the doubles that are written: every point must be one. This also bounds the integers.
@@ -193,7 +236,7 @@ fn refuse_inexact(map: &PlanarMap) -> Result<(), Error> {
     }
 }
 
-/// Premise (b).
+/// Premise (b): the certificate as far as triangles go. All of them are looked at, so that the error names all that fail.
 fn prove_triangles(map: &PlanarMap) -> Result<Certificate, Error> {
     let mut certificate = Certificate {
         by_bounds: 0,

@@ -24,14 +24,24 @@ pub fn check(loops: &[Vec<GridPoint>]) -> Option<Wrong> {
     if let Some(pair) = crossing(loops) {
         return Some(Wrong::Crossing(pair));
     }
-    let left: Vec<usize> = (0..loops.len()).filter(|i| doubled_area(&loops[*i]) > 0.0).collect();
-    let &[outer] = &left[..] else { return Some(Wrong::Outer(left.get(1).copied().unwrap_or(0))) };
-    let holes = || (0..loops.len()).filter(|i| *i != outer);
-    let misplaced = |hole: &usize| {
-        let point = loops[*hole][0];
-        !is_inside(point, &loops[outer]) || holes().any(|other| other != *hole && is_inside(point, &loops[other]))
+    let turning_left: Vec<usize> = (0..loops.len()).filter(|i| doubled_area(&loops[*i]) > 0.0).collect();
+    let &[outer] = &turning_left[..] else {
+        // The second that turns left; where none does, the first loop.
+        return Some(Wrong::Outer(turning_left.get(1).copied().unwrap_or(0)));
     };
-    holes().find(misplaced).map(Wrong::Nesting)
+    let mut holes = (0..loops.len()).filter(|i| *i != outer);
+    holes.find(|hole| is_misplaced(loops, outer, *hole)).map(Wrong::Nesting)
+}
+
+/// Whether a hole lies outside the outer loop, or inside another hole. As no loops cross or touch, one point of the hole
+/// tells for all of it.
+fn is_misplaced(loops: &[Vec<GridPoint>], outer: usize, hole: usize) -> bool {
+    let point = loops[hole][0];
+    if !is_inside(point, &loops[outer]) {
+        return true;
+    }
+    let mut others = (0..loops.len()).filter(|i| *i != outer && *i != hole);
+    others.any(|other| is_inside(point, &loops[other]))
 }
 
 /// Twice the signed area, to rounding; its sign is that of simple polygons of any area above rounding.
@@ -43,18 +53,30 @@ fn doubled_area(polygon: &[GridPoint]) -> f64 {
 
 /// The first two sides that share a point other than the end that neighbours have in common.
 fn crossing(loops: &[Vec<GridPoint>]) -> Option<[(usize, usize); 2]> {
-    let sides: Vec<(usize, usize)> =
-        loops.iter().enumerate().flat_map(|(l, polygon)| (0..polygon.len()).map(move |i| (l, i))).collect();
-    let ends = |(l, i): (usize, usize)| [loops[l][i], loops[l][(i + 1) % loops[l].len()]];
-    let tree = Bvh::new(sides.iter().map(|s| around(ends(*s))));
+    let mut sides: Vec<Side> = Vec::new();
+    for (l, polygon) in loops.iter().enumerate() {
+        sides.extend((0..polygon.len()).map(|i| (l, i)));
+    }
+    let tree = Bvh::new(sides.iter().map(|s| around(ends(loops, *s))));
+    // The tree tells pairs in an order of its own: the first by number is kept, and only those before it are looked at.
     let mut first: Option<[u32; 2]> = None;
     tree.pairs(|a, b| {
         let (s, t) = (sides[a as usize], sides[b as usize]);
-        if first.is_none_or(|first| [a, b] < first) && clash(ends(s), ends(t), succession(loops, s, t)) {
+        let is_earlier = first.is_none_or(|first| [a, b] < first);
+        if is_earlier && clash(ends(loops, s), ends(loops, t), succession(loops, s, t)) {
             first = Some([a, b]);
         }
     });
     first.map(|pair| pair.map(|side| sides[side as usize]))
+}
+
+/// A side of a polygon: its loop, and its place there.
+type Side = (usize, usize);
+
+/// The points at which a side begins and ends.
+fn ends(loops: &[Vec<GridPoint>], (l, i): Side) -> [GridPoint; 2] {
+    let polygon = &loops[l];
+    [polygon[i], polygon[(i + 1) % polygon.len()]]
 }
 
 /// How two sides follow each other in a loop.
@@ -68,10 +90,13 @@ enum Succession {
     Both,
 }
 
-fn succession(loops: &[Vec<GridPoint>], s: (usize, usize), t: (usize, usize)) -> Succession {
+fn succession(loops: &[Vec<GridPoint>], s: Side, t: Side) -> Succession {
+    if s.0 != t.0 {
+        return Succession::None;
+    }
     let count = loops[s.0].len();
-    let same = s.0 == t.0;
-    match (same && (s.1 + 1) % count == t.1, same && (t.1 + 1) % count == s.1) {
+    let follows = |first: Side, second: Side| (first.1 + 1) % count == second.1;
+    match (follows(s, t), follows(t, s)) {
         (true, true) => Succession::Both,
         (true, false) => Succession::Forward,
         (false, true) => Succession::Backward,
@@ -79,8 +104,10 @@ fn succession(loops: &[Vec<GridPoint>], s: (usize, usize), t: (usize, usize)) ->
     }
 }
 
+/// Whether two sides share a point other than the end that neighbours have in common.
 fn clash([a, b]: [GridPoint; 2], [c, d]: [GridPoint; 2], succession: Succession) -> bool {
     match succession {
+        // There and back along one side.
         Succession::Both => true,
         Succession::Forward => turns_back(a, b, d),
         Succession::Backward => turns_back(c, d, b),
@@ -98,26 +125,33 @@ fn turns_back(a: GridPoint, b: GridPoint, c: GridPoint) -> bool {
 /// Whether two segments have a point in common.
 fn meet([a, b]: [GridPoint; 2], [c, d]: [GridPoint; 2]) -> bool {
     let sign = |p, q, r| orientation(p, q, r).signum();
-    let (s, t) = ([sign(a, b, c), sign(a, b, d)], [sign(c, d, a), sign(c, d, b)]);
-    if s == [0, 0] && t == [0, 0] {
+    // On which sides of the one the ends of the other lie.
+    let of_second = [sign(a, b, c), sign(a, b, d)];
+    let of_first = [sign(c, d, a), sign(c, d, b)];
+    if of_second == [0, 0] && of_first == [0, 0] {
         // On one line: their boxes met already, and so do they.
         return true;
     }
-    s[0] * s[1] <= 0 && t[0] * t[1] <= 0
+    of_second[0] * of_second[1] <= 0 && of_first[0] * of_first[1] <= 0
 }
 
 /// Whether a point lies inside a polygon that does not pass through it: crossings of a ray to the right.
 fn is_inside(p: GridPoint, polygon: &[GridPoint]) -> bool {
+    let mut is_inside = false;
     let next = polygon.iter().cycle().skip(1);
-    let crossed = |(a, b): &(&GridPoint, &GridPoint)| {
+    for (a, b) in polygon.iter().zip(next) {
+        // Half-open: a corner on the ray counts for the sides that go up from it, or come down to it.
         let upward = a.y <= p.y && p.y < b.y;
         let downward = b.y <= p.y && p.y < a.y;
-        let side = orientation(**a, **b, p);
-        (upward && side > 0) || (downward && side < 0)
-    };
-    polygon.iter().zip(next).filter(crossed).count() % 2 == 1
+        let side = orientation(*a, *b, p);
+        if (upward && side > 0) || (downward && side < 0) {
+            is_inside = !is_inside;
+        }
+    }
+    is_inside
 }
 
+/// A box that contains a side.
 fn around(ends: [GridPoint; 2]) -> BoundingBox {
     // Doubles of 64-bit integers may be off by a unit in the last place: boxes are a little larger.
     let slack = |c: i64, way: f64| c as f64 + way * 2.0;

@@ -54,21 +54,53 @@ pub enum StraightError {
 ///
 /// # Errors
 /// The first premise that fails, with its evidence.
+///
+/// # Example
+///
+/// Here middles of edges are corners like any other, and the boundary need not run around the origin.
+///
+/// ```
+/// use planish_core::certify::{PlanarMap, StraightError, prove, prove_straight};
+/// use planish_core::grid::GridPoint;
+///
+/// let places = [[0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.5, 0.2], [0.5, 0.5], [0.1, 0.5]];
+/// let nodes = places.map(GridPoint::vertex).to_vec();
+/// let map = PlanarMap { cells: vec![[0, 1, 2, 3, 4, 5]], nodes, hole_centres: vec![] };
+/// assert!(prove_straight(map.clone()).is_ok());
+/// assert!(prove(map.clone()).is_err(), "the certifier of curved maps wants the origin inside");
+///
+/// let mut folded = map;
+/// folded.nodes[3] = GridPoint::vertex([0.5, 0.6]);
+/// assert!(matches!(prove_straight(folded), Err(StraightError::Folded { count: 1, .. })));
+/// ```
 pub fn prove_straight(map: PlanarMap) -> Result<StraightMap, StraightError> {
     let loops = incidence::boundary_loops(&map.cells, map.nodes.len())?;
     refuse_inexact(&map).map_err(StraightError::Node)?;
-    let at = |n: u32| map.nodes[n as usize];
-    let turns_left = |c: &[u32; 6]| parts(c.map(at)).iter().all(|[a, b, c]| orientation(*a, *b, *c) > 0);
-    let mut folded = (0..map.cells.len()).filter(|f| !turns_left(&map.cells[*f]));
+    let mut folded = (0..map.cells.len()).filter(|f| !turns_left(&map, *f));
     if let Some(first) = folded.next() {
         return Err(StraightError::Folded { count: 1 + folded.count(), first: FaceId::at(first) });
     }
-    let polygon = |l: &Vec<[u32; 3]>| l.iter().flat_map(|[from, mid, _]| [at(*from), at(*mid)]).collect();
-    let polygons: Vec<Vec<GridPoint>> = loops.iter().map(polygon).collect();
+    let polygons: Vec<Vec<GridPoint>> = loops.iter().map(|l| polygon(&map, l)).collect();
     match polygons::check(&polygons) {
         Some(wrong) => Err(StraightError::Boundary(wrong)),
         None => Ok(StraightMap { map }),
     }
+}
+
+/// Whether all four parts of a cell turn left.
+fn turns_left(map: &PlanarMap, cell: usize) -> bool {
+    let nodes = map.cells[cell].map(|n| map.nodes[n as usize]);
+    parts(nodes).iter().all(|[a, b, c]| orientation(*a, *b, *c) > 0)
+}
+
+/// A loop of the boundary by its corners: vertices and middles of edges in turn.
+fn polygon(map: &PlanarMap, boundary_loop: &[incidence::ArcNodes]) -> Vec<GridPoint> {
+    let mut corners = Vec::with_capacity(2 * boundary_loop.len());
+    for [from, mid, _] in boundary_loop {
+        corners.push(map.nodes[*from as usize]);
+        corners.push(map.nodes[*mid as usize]);
+    }
+    corners
 }
 
 #[cfg(test)]

@@ -77,17 +77,36 @@ impl JacobianBezier {
     /// vertices lie on the grid of vertices.
     pub fn new(nodes: [GridPoint; 6]) -> Self {
         let [p, q, r, m01, m12, m20] = nodes;
+        // The six Bezier points, all relative to the first vertex.
         let corner = [p, q, r].map(|v| v.from_origin(p));
         let c01 = bezier_control(p, m01, q, p);
         let c12 = bezier_control(q, m12, r, p);
         let c20 = bezier_control(r, m20, p, p);
+        // The derivatives at the corners, along xi and along eta.
         let a = [c01.minus(corner[0]), corner[1].minus(c01), c12.minus(c20)].map(twice);
         let b = [c20.minus(corner[0]), c12.minus(c01), corner[2].minus(c20)].map(twice);
+        // Twice M_ii and M_ij: the latter might not be an integer.
+        let corners = [0, 1, 2].map(|i| 2 * a[i].cross(b[i]));
         let mixed = |i: usize, j: usize| a[i].cross(b[j]) + a[j].cross(b[i]);
-        Self { corner: [0, 1, 2].map(|i| 2 * a[i].cross(b[i])), edge: [mixed(0, 1), mixed(1, 2), mixed(2, 0)] }
+        Self { corner: corners, edge: [mixed(0, 1), mixed(1, 2), mixed(2, 0)] }
     }
 
     /// Decides exactly whether the determinant is positive on the closed triangle.
+    ///
+    /// # Example
+    ///
+    /// A negative coefficient proves nothing, and bounds by subdivision may not either: the exact test decides.
+    ///
+    /// ```
+    /// use planish_core::fem::bernstein::{JacobianBezier, Validity};
+    ///
+    /// // In the middle of edge 01 the determinant is (d_0 + 2 e_01 + d_1) / 4 = 0 ...
+    /// let touching = JacobianBezier { corner: [4, 4, 4], edge: [-4, 4, 4] };
+    /// assert_eq!(touching.validity(), Validity::Invalid);
+    /// // ... and here all of that edge is above zero, by a hair.
+    /// let above = JacobianBezier { corner: [4, 5, 4], edge: [-4, 4, 4] };
+    /// assert_eq!(above.validity(), Validity::ByCopositivity);
+    /// ```
     pub fn validity(&self) -> Validity {
         if self.corner.iter().any(|c| *c <= 0) {
             return Validity::Invalid;
@@ -112,7 +131,9 @@ impl JacobianBezier {
         let diagonal = |k: usize| &d[(k + 1) % 3] * &d[(k + 2) % 3] - &e[(k + 1) % 3] * &e[(k + 1) % 3];
         let mixed = |k: usize| &e[(k + 1) % 3] * &e[(k + 2) % 3] - &e[k] * &d[(k + 2) % 3];
         let det = &d[0] * diagonal(0) + &e[0] * mixed(0) + &e[2] * mixed(2);
-        det > zero || !(0..3).all(|k| diagonal(k) > zero && mixed(k) > zero)
+        // Hadeler's criterion: where no edge fails, M does exactly if det M <= 0 and all of adj M is positive.
+        let adjugate_is_positive = (0..3).all(|k| diagonal(k) > zero && mixed(k) > zero);
+        det > zero || !adjugate_is_positive
     }
 
     /// A lower bound of the determinant over the triangle. Subdivides while a coefficient is not positive, to a fixed
@@ -122,16 +143,22 @@ impl JacobianBezier {
         let mut value = f64::INFINITY;
         let mut depth = 0;
         loop {
+            // Quarters come multiplied by four.
             let scale = (4.0_f64).powi(-(depth as i32)) / (2.0 * UNITS * UNITS);
-            let last = depth == DEPTH;
-            let (done, open): (Vec<_>, Vec<_>) = pieces.into_iter().partition(|p| last || p.min_coefficient() > 0);
-            for piece in &done {
-                value = value.min((piece.min_coefficient() as f64).next_down() * scale);
+            let is_last = depth == DEPTH;
+            let mut open = Vec::new();
+            for piece in pieces {
+                let least = piece.min_coefficient();
+                if is_last || least > 0 {
+                    value = value.min((least as f64).next_down() * scale);
+                } else {
+                    open.extend(piece.quarters());
+                }
             }
             if open.is_empty() {
                 return LowerBound { value, depth };
             }
-            pieces = open.iter().flat_map(Self::quarters).collect();
+            pieces = open;
             depth += 1;
         }
     }
@@ -170,6 +197,18 @@ fn twice(v: GridVector) -> GridVector {
 
 /// The least and the largest value over the triangle of the quadratic polynomial with these Bernstein
 /// coefficients (M_00, M_11, M_22, M_01, M_12, M_20), up to rounding.
+///
+/// # Example
+///
+/// Coefficients of edges are bounds, not values: one may be negative where the polynomial is not.
+///
+/// ```
+/// use planish_core::fem::bernstein::range;
+///
+/// // On edge 01: (1-t)^2 - t (1-t) + t^2, with the least value 1/4 in the middle.
+/// let found = range([1.0, 1.0, 1.0, -0.5, 1.0, 1.0]);
+/// assert_eq!((found.min, found.max), (0.25, 1.0));
+/// ```
 pub fn range(c: [f64; 6]) -> Range {
     Range { min: minimum(c), max: -minimum(c.map(|v| -v)) }
 }
@@ -184,8 +223,10 @@ fn minimum(c: [f64; 6]) -> f64 {
 /// The least value of (1-t)^2 a + 2 t (1-t) m + t^2 b for t in [0, 1].
 fn min_on_edge(a: f64, m: f64, b: f64) -> f64 {
     let bend = (a - m) + (b - m);
+    // Where the slope is zero.
     let t = (a - m) / bend;
-    if bend > 0.0 && t > 0.0 && t < 1.0 { a + t * (m - a) } else { a.min(b) }
+    let is_least_between = bend > 0.0 && t > 0.0 && t < 1.0;
+    if is_least_between { a + t * (m - a) } else { a.min(b) }
 }
 
 /// The value at the stationary point, if it lies inside and is a minimum: l ~ adj(M) e, value det M / sum.
@@ -194,9 +235,12 @@ fn min_inside(c: [f64; 6]) -> Option<f64> {
     let g = [c[3] - c[0], c[5] - c[0]];
     let h = [c[0] - 2.0 * c[3] + c[1], c[0] - c[3] - c[5] + c[4], c[0] - 2.0 * c[5] + c[2]];
     let det = h[0] * h[2] - h[1] * h[1];
-    let (x, y) = ((h[1] * g[1] - h[2] * g[0]) / det, (h[1] * g[0] - h[0] * g[1]) / det);
-    let inside = det > 0.0 && h[0] > 0.0 && x > 0.0 && y > 0.0 && x + y < 1.0;
-    inside.then(|| c[0] + g[0] * x + g[1] * y)
+    let x = (h[1] * g[1] - h[2] * g[0]) / det;
+    let y = (h[1] * g[0] - h[0] * g[1]) / det;
+    let is_minimum = det > 0.0 && h[0] > 0.0;
+    let is_inside = x > 0.0 && y > 0.0 && x + y < 1.0;
+    // There H x = -g, so that half of the linear term is left.
+    (is_minimum && is_inside).then(|| c[0] + g[0] * x + g[1] * y)
 }
 
 #[cfg(test)]

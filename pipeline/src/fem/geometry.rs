@@ -6,6 +6,26 @@ use crate::vec3::{Vec3, dot};
 
 /// The first fundamental form of a map x(xi, eta) from the reference triangle to space, at one point: all that the
 /// Laplacian of a surface depends on.
+///
+/// # Example
+///
+/// The area of an eighth of the unit sphere, as a flat triangle and as one through six points.
+///
+/// ```
+/// use planish_core::fem::element::{Element, P1, P2};
+/// use planish_core::fem::geometry::FirstForm;
+/// use planish_core::fem::quadrature::Rule;
+/// use planish_core::vec3::norm;
+///
+/// let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// let on_sphere = |p: [f64; 3]| p.map(|c| c / norm(p));
+/// let nodes = P2::NODES.map(|l| on_sphere(P1::interpolate(&corners, l)));
+/// // The reference triangle has the area 1/2.
+/// let flat = 0.5 * FirstForm::of_nodes::<P1, 3>(&corners, [1.0 / 3.0; 3]).area_element();
+/// let curved = 0.5 * Rule::of_degree(8).mean(|l| FirstForm::of_nodes::<P2, 6>(&nodes, l).area_element());
+/// let exact = std::f64::consts::PI / 2.0;
+/// assert!((flat / exact - 1.0).abs() > 0.4 && (curved / exact - 1.0).abs() < 0.1);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstForm {
     /// x_xi . x_xi

@@ -25,12 +25,11 @@ pub(crate) struct CornerDerivatives {
 impl CornerDerivatives {
     /// Of nodal values `x`, taken relative to the first so that small triangles lose no digits.
     pub fn new(x: &P2Nodes) -> Self {
-        let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
-        let along = |k: usize, dir: usize| {
-            let terms = |c: usize| (1..6).map(|n| AT_CORNERS[k][n][dir] * d[n][c]).sum::<f64>();
-            [terms(0), terms(1)]
-        };
-        Self { a: [0, 1, 2].map(|k| along(k, 0)), b: [0, 1, 2].map(|k| along(k, 1)) }
+        let from_first = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
+        Self {
+            a: [0, 1, 2].map(|corner| derivative(&from_first, corner, 0)),
+            b: [0, 1, 2].map(|corner| derivative(&from_first, corner, 1)),
+        }
     }
 
     /// The six Bernstein coefficients of the jacobian determinant.
@@ -40,10 +39,14 @@ impl CornerDerivatives {
 
     /// What is linear in t in the coefficients of `self + t other`.
     pub fn polarization(&self, other: &Self) -> [f64; 6] {
-        let one = |p: &Self, q: &Self, i: usize, j: usize| cross(p.a[i], q.b[j]);
-        PAIRS.map(|(i, j)| {
-            0.5 * (one(self, other, i, j) + one(other, self, i, j) + one(self, other, j, i) + one(other, self, j, i))
-        })
+        let mut linear = [0.0; 6];
+        for (k, (i, j)) in PAIRS.into_iter().enumerate() {
+            // The product rule, on the two products that make a coefficient (see `dets`).
+            let first = cross(self.a[i], other.b[j]) + cross(other.a[i], self.b[j]);
+            let second = [cross(self.a[j], other.b[i]), cross(other.a[j], self.b[i])];
+            linear[k] = 0.5 * (first + second[0] + second[1]);
+        }
+        linear
     }
 
     /// The gradient of coefficient `k` with respect to the twelve nodal values (u0, v0, u1, ...).
@@ -51,14 +54,22 @@ impl CornerDerivatives {
         let (i, j) = PAIRS[k];
         let mut g = [0.0; 12];
         for n in 0..6 {
+            // The derivatives of a_p x b_q / 2: node n moves a_p by its first weight and b_q by its second.
             for (p, q) in [(i, j), (j, i)] {
-                let (ga, gb) = (0.5 * AT_CORNERS[p][n][0], 0.5 * AT_CORNERS[q][n][1]);
-                g[2 * n] += ga * self.b[q][1] - gb * self.a[p][1];
-                g[2 * n + 1] += gb * self.a[p][0] - ga * self.b[q][0];
+                let in_a = 0.5 * AT_CORNERS[p][n][0];
+                let in_b = 0.5 * AT_CORNERS[q][n][1];
+                g[2 * n] += in_a * self.b[q][1] - in_b * self.a[p][1];
+                g[2 * n + 1] += in_b * self.a[p][0] - in_a * self.b[q][0];
             }
         }
         g
     }
+}
+
+/// The derivative at a corner along xi (`direction` 0) or eta (1) of nodal values of which the first is zero.
+fn derivative(x: &P2Nodes, corner: usize, direction: usize) -> [f64; 2] {
+    let weights = &AT_CORNERS[corner];
+    [0, 1].map(|component| (1..6).map(|n| weights[n][direction] * x[n][component]).sum())
 }
 
 /// A curved triangle, a direction, and the triangle moved along it.

@@ -89,7 +89,16 @@ impl Rule {
     /// The highest degree that a rule has.
     pub const MAX_DEGREE: u32 = 8;
 
-    /// The smallest rule that integrates all polynomials up to `degree` exactly.
+    /// The smallest rule that integrates all polynomials up to `degree` exactly. There is not one for every degree.
+    ///
+    /// ```
+    /// use planish_core::fem::quadrature::Rule;
+    ///
+    /// assert_eq!(Rule::of_degree(3).degree(), 4);
+    /// let mut points = 0;
+    /// Rule::of_degree(3).for_each(|_, _| points += 1);
+    /// assert_eq!(points, 6);
+    /// ```
     ///
     /// # Panics
     /// Where `degree` is above [`Self::MAX_DEGREE`]: there is no such rule.
@@ -110,12 +119,15 @@ impl Rule {
                 Orbit::Centroid { weight } => visit([1.0 / 3.0; 3], weight),
                 Orbit::Medians { a, weight } => {
                     let b = 1.0 - 2.0 * a;
-                    [[b, a, a], [a, b, a], [a, a, b]].into_iter().for_each(|l| visit(l, weight));
+                    for l in [[b, a, a], [a, b, a], [a, a, b]] {
+                        visit(l, weight);
+                    }
                 }
                 Orbit::General { a, b, weight } => {
                     let c = 1.0 - a - b;
-                    let all = [[a, b, c], [b, c, a], [c, a, b], [a, c, b], [c, b, a], [b, a, c]];
-                    all.into_iter().for_each(|l| visit(l, weight));
+                    for l in [[a, b, c], [b, c, a], [c, a, b], [a, c, b], [c, b, a], [b, a, c]] {
+                        visit(l, weight);
+                    }
                 }
             }
         }

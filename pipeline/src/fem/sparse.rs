@@ -60,10 +60,43 @@ pub enum Error {
 
 /// The pattern of a symmetric matrix that is the sum of dense element matrices, and where each entry of each
 /// element goes.
+///
+/// Made once, analysed once, factorised for every matrix, solved for every right-hand side.
+///
+/// # Example
+///
+/// A chain of two springs that hangs from the ceiling, pulled at its lower end, and then in the middle.
+///
+/// ```
+/// use planish_core::fem::sparse::{PRESCRIBED, Pattern, Unsolvable};
+/// use planish_core::monitor::NoMonitor;
+///
+/// let spring = [[1.0, -1.0], [-1.0, 1.0]];
+/// let pattern = Pattern::new(2, &[[PRESCRIBED, 0], [0, 1]]);
+/// let mut matrix = pattern.zeros();
+/// pattern.add(&mut matrix, 0, &spring);
+/// pattern.add(&mut matrix, 1, &spring);
+/// let analysis = pattern.analyse()?;
+/// let factor = analysis.factorise(&matrix, &NoMonitor)?;
+/// // Two right-hand sides, one after another, and the displacements in their place.
+/// let mut forces = [0.0, 1.0, 1.0, 0.0];
+/// factor.solve(&mut forces, 2);
+/// assert!(forces.iter().zip([1.0, 2.0, 1.0, 1.0]).all(|(got, want)| (got - want).abs() < 1e-14));
+///
+/// // Without the upper spring nothing holds the chain.
+/// let mut loose = pattern.zeros();
+/// pattern.add(&mut loose, 1, &spring);
+/// let refused = analysis.factorise(&loose, &NoMonitor).err();
+/// assert_eq!(refused, Some(Unsolvable::Singular { unknowns: 2 }.into()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Pattern {
     unknowns: usize,
+    /// Compressed columns of the lower triangle: where each column begins in `rows`, and where the last one ends.
     starts: Vec<u32>,
+    /// The row of each entry, ascending in each column; the diagonal comes first.
     rows: Vec<u32>,
+    /// Per element its lower triangle row by row: which entry of the matrix each of its own goes to, or [`PRESCRIBED`].
     slots: Vec<u32>,
 }
 
@@ -78,8 +111,12 @@ impl Pattern {
         for j in 0..unknowns {
             let column = columns.row_mut(j);
             column.sort_unstable();
+            // Entries of several elements in one place are one entry of the matrix.
             for run in column.chunk_by(|a, b| a.0 == b.0) {
-                run.iter().for_each(|(_, i)| pattern.slots[*i as usize] = pattern.rows.len() as u32);
+                let slot = pattern.rows.len() as u32;
+                for (_, i) in run {
+                    pattern.slots[*i as usize] = slot;
+                }
                 pattern.rows.push(run[0].0);
             }
             pattern.starts.push(pattern.rows.len() as u32);
@@ -104,7 +141,7 @@ impl Pattern {
         }
     }
 
-    /// The places of the diagonal entries.
+    /// The places of the diagonal entries among the values of a matrix: the first of each column.
     pub fn diagonal(&self) -> impl Iterator<Item = usize> {
         self.starts[..self.unknowns].iter().map(|s| *s as usize)
     }
@@ -129,16 +166,22 @@ impl Pattern {
     }
 
     fn analyse_in(&self, order: SymmetricOrdering<u32>) -> Result<Analysis<'_>, Unsolvable> {
+        let too_large = Unsolvable::TooLarge { unknowns: self.unknowns };
+        // It fails where memory is short, or where the factor has more entries than 32 bits count.
         let symbolic = factorize_symbolic_cholesky(self.view(), Side::Lower, order, Default::default());
-        let fits = |s: &SymbolicCholesky<u32>| s.len_val() <= MAX_FACTOR_BYTES / size_of::<f64>();
-        let symbolic = symbolic.ok().filter(fits).ok_or(Unsolvable::TooLarge { unknowns: self.unknowns })?;
+        let Ok(symbolic) = symbolic else { return Err(too_large) };
+        if symbolic.len_val() > MAX_FACTOR_BYTES / size_of::<f64>() {
+            return Err(too_large);
+        }
         Ok(Analysis { pattern: self, symbolic })
     }
 
     /// The unknowns in an order of minimum degree; as they are numbered, where memory is short.
     pub fn minimum_degree(&self) -> Vec<u32> {
-        let as_numbered = || (0..self.unknowns as u32).collect();
-        let (mut order, mut places): (Vec<u32>, Vec<u32>) = (as_numbered(), as_numbered());
+        let as_numbered = || -> Vec<u32> { (0..self.unknowns as u32).collect() };
+        // The order, and its inverse: per unknown, when its turn is.
+        let mut order = as_numbered();
+        let mut places = as_numbered();
         let scratch = amd::order_maybe_unsorted_scratch::<u32>(self.unknowns, self.rows.len());
         let Ok(mut memory) = MemBuffer::try_new(scratch) else { return order };
         let stack = MemStack::new(&mut memory);
@@ -232,6 +275,20 @@ impl Factor<'_> {
 ///
 /// # Errors
 /// [`Unsolvable`].
+///
+/// # Example
+///
+/// ```
+/// use planish_core::fem::sparse::solve_general;
+/// use planish_core::monitor::NoMonitor;
+///
+/// // 2 x + y = 5 and -x + 3 y = 8.
+/// let entries = [(0, 0, 2.0), (0, 1, 1.0), (1, 0, -1.0), (1, 1, 3.0)];
+/// let mut rhs = [5.0, 8.0];
+/// solve_general(2, &entries, &mut rhs, 1, &NoMonitor)?;
+/// assert!((rhs[0] - 1.0).abs() < 1e-14 && (rhs[1] - 3.0).abs() < 1e-14);
+/// # Ok::<(), planish_core::fem::sparse::Unsolvable>(())
+/// ```
 pub fn solve_general(
     unknowns: usize,
     entries: &[(u32, u32, f64)],
@@ -241,13 +298,15 @@ pub fn solve_general(
 ) -> Result<(), Unsolvable> {
     let bytes = GROWTH * entries.len() * (size_of::<u32>() + size_of::<f64>());
     let _reserved = Reserved::new(monitor, bytes as u64);
+    let (singular, too_large) = (Unsolvable::Singular { unknowns }, Unsolvable::TooLarge { unknowns });
     let triplets: Vec<_> = entries.iter().map(|(r, c, v)| Triplet::new(*r, *c, *v)).collect();
-    let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(unknowns, unknowns, &triplets)
-        .map_err(|_| Unsolvable::TooLarge { unknowns })?;
-    let symbolic = SymbolicLu::try_new(matrix.symbolic()).map_err(|_| Unsolvable::TooLarge { unknowns })?;
-    let factor = Lu::try_new_with_symbolic(symbolic, matrix.rb()).map_err(|_| Unsolvable::Singular { unknowns })?;
+    let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(unknowns, unknowns, &triplets);
+    let Ok(matrix) = matrix else { return Err(too_large) };
+    let Ok(symbolic) = SymbolicLu::try_new(matrix.symbolic()) else { return Err(too_large) };
+    let Ok(factor) = Lu::try_new_with_symbolic(symbolic, matrix.rb()) else { return Err(singular) };
     factor.solve_in_place(MatMut::from_column_major_slice_mut(rhs, unknowns, columns));
-    if rhs.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(Unsolvable::Singular { unknowns }) }
+    // What was divided by a pivot of zero is not finite.
+    if rhs.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(singular) }
 }
 
 #[cfg(test)]

@@ -6,9 +6,11 @@
 
 use crate::grid::GridPoint;
 use crate::map::filled::FilledChart;
+use crate::topology::HalfEdgeId;
 use std::f64::consts::TAU;
 
-/// The shortest edge, relative to the mean, as far as its arc is concerned.
+/// The shortest edge, relative to the mean, as far as its arc is concerned. By experience: small enough that shares are
+/// those of lengths on any mesh but the worst, large enough that arcs are long against the grid.
 const SHORTEST: f64 = 1e-4;
 
 /// The longest arc, as a share of the circle: below one half, so that every arc is seen from the centre.
@@ -47,9 +49,31 @@ pub enum Error {
 
 impl Boundary {
     /// The loop on the unit circle, by arc length, counter-clockwise from (1, 0).
+    ///
+    /// # Example
+    ///
+    /// The loop of this disk is a hexagon: each of its sides takes a sixth of the circle.
+    ///
+    /// ```
+    /// use planish_core::map::boundary::{Boundary, Mids};
+    /// use planish_core::map::filled::FilledChart;
+    /// use planish_core::{decompose, repair, shapes};
+    ///
+    /// let mesh = repair(&shapes::flat_disk(1), &Default::default())?.mesh;
+    /// let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()])?;
+    /// let chart = FilledChart::new(&atlas.charts()[0]);
+    /// let on_arcs = Boundary::circle(&chart, Mids::Arc);
+    /// assert_eq!(on_arcs.vertices()[0].uv(), [1.0, 0.0]);
+    /// let radius = |[u, v]: [f64; 2]| u.hypot(v);
+    /// assert!((radius(on_arcs.mids()[0].uv()) - 1.0).abs() < 1e-14);
+    /// let on_chords = Boundary::circle(&chart, Mids::Chord);
+    /// assert!((radius(on_chords.mids()[0].uv()) - 0.75_f64.sqrt()).abs() < 1e-14);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn circle(chart: &FilledChart, mids: Mids) -> Self {
         let outer = chart.outer();
-        let lengths: Vec<f64> = outer.iter().map(|h| chart.shapes()[h.face().index()].lengths[h.side()]).collect();
+        let length = |h: &HalfEdgeId| chart.shapes()[h.face().index()].lengths[h.side()];
+        let lengths: Vec<f64> = outer.iter().map(length).collect();
         let shares = arc_shares(&lengths);
         let mut vertices = Vec::with_capacity(outer.len());
         let mut middle = Vec::with_capacity(outer.len());
@@ -62,18 +86,38 @@ impl Boundary {
         Self { vertices, mids: middle }.with_mids(mids)
     }
 
-    /// The loop on prescribed points, in the order of [`FilledChart::outer`]; arcs are those of the unit circle.
+    /// The loop on prescribed points, in the order of [`FilledChart::outer`]; arcs are those of the unit circle, so that
+    /// [`Mids::Arc`] makes sense for points on it only.
     ///
     /// # Errors
     /// [`Error::Count`].
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use planish_core::map::boundary::{Boundary, Error, Mids};
+    /// use planish_core::map::filled::FilledChart;
+    /// use planish_core::{decompose, repair, shapes};
+    ///
+    /// let mesh = repair(&shapes::floater_five(), &Default::default())?.mesh;
+    /// let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()])?;
+    /// let chart = FilledChart::new(&atlas.charts()[0]);
+    /// let square = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+    /// let boundary = Boundary::prescribed(&chart, &square, Mids::Chord)?;
+    /// assert_eq!(boundary.mids()[0].uv(), [0.5, 0.5]);
+    /// let too_few = Boundary::prescribed(&chart, &square[..3], Mids::Chord);
+    /// assert_eq!(too_few, Err(Error::Count { given: 3, needed: 4 }));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn prescribed(chart: &FilledChart, points: &[[f64; 2]], mids: Mids) -> Result<Self, Error> {
-        let bisector = |i: usize| {
-            let (p, q) = (points[i], points[(i + 1) % points.len()]);
+        let mut middle = Vec::with_capacity(points.len());
+        for (i, p) in points.iter().enumerate() {
+            let q = points[(i + 1) % points.len()];
+            // The middle of the arc lies in the direction of the middle of the chord.
             let sum = [p[0] + q[0], p[1] + q[1]];
             let length = sum[0].hypot(sum[1]);
-            sum.map(|c| c / length)
-        };
-        let middle: Vec<[f64; 2]> = (0..points.len()).map(bisector).collect();
+            middle.push(sum.map(|c| c / length));
+        }
         Ok(Self::through(chart, points, &middle)?.with_mids(mids))
     }
 
@@ -116,8 +160,11 @@ impl Boundary {
     /// Moves the mid-edge node of edge `i` from the arc towards the chord: to the chord (`all_the_way`), or
     /// half-way there.
     pub(crate) fn flatten(&mut self, i: usize, all_the_way: bool) {
-        let (m, c) = (self.mids[i], self.chord(i));
-        self.mids[i] = if all_the_way { c } else { GridPoint { x: (m.x + c.x) / 2, y: (m.y + c.y) / 2 } };
+        let on_arc = self.mids[i];
+        let on_chord = self.chord(i);
+        // Rounded to the grid of mid-edge nodes, on which any integer is a place.
+        let half_way = GridPoint { x: (on_arc.x + on_chord.x) / 2, y: (on_arc.y + on_chord.y) / 2 };
+        self.mids[i] = if all_the_way { on_chord } else { half_way };
     }
 }
 
@@ -130,11 +177,13 @@ fn arc_shares(lengths: &[f64]) -> Vec<f64> {
     let mut shares: Vec<f64> = lengthened.iter().map(|l| l / total).collect();
     // At most two edges can be too long; giving what they lose to the others makes at most one more too long.
     for _ in 0..3 {
-        let long = |share: &f64| *share >= LONGEST;
-        let excess: f64 = shares.iter().filter(|s| long(s)).map(|s| s - LONGEST).sum();
-        let rest: f64 = shares.iter().filter(|s| !long(s)).sum();
+        let is_long = |share: &f64| *share >= LONGEST;
+        let excess: f64 = shares.iter().filter(|s| is_long(s)).map(|s| s - LONGEST).sum();
+        let rest: f64 = shares.iter().filter(|s| !is_long(s)).sum();
         if excess > 0.0 {
-            shares.iter_mut().for_each(|s| *s = if long(s) { LONGEST } else { *s * (1.0 + excess / rest) });
+            for share in &mut shares {
+                *share = if is_long(share) { LONGEST } else { *share * (1.0 + excess / rest) };
+            }
         }
     }
     shares

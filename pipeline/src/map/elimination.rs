@@ -20,8 +20,10 @@ pub(crate) fn of_vertices(triangles: &[[VertexId; 3]], count: usize, outer: &[Ha
     }
     let inside: Vec<u32> = (0..count as u32).filter(|v| !is_outer[*v as usize]).collect();
     let dofs = Dofs::new(count, inside);
-    let order = dofs.pattern(triangles.iter().map(|t| t.map(|v| v.index()))).minimum_degree();
-    order.into_iter().map(|unknown| VertexId(dofs.free()[unknown as usize])).collect()
+    // Linear elements: two vertices have to do with each other where a triangle joins them.
+    let elements = triangles.iter().map(|t| t.map(|v| v.index()));
+    let unknowns = dofs.pattern(elements).minimum_degree();
+    unknowns.into_iter().map(|unknown| VertexId(dofs.free()[unknown as usize])).collect()
 }
 
 /// All nodes of quadratic elements in the order in which they are eliminated; those of which no vertex inside is an
@@ -29,13 +31,19 @@ pub(crate) fn of_vertices(triangles: &[[VertexId; 3]], count: usize, outer: &[Ha
 pub(crate) fn of_nodes(chart: &FilledChart) -> Vec<usize> {
     let last = chart.elimination().len() as u64;
     let mut turn = vec![last; chart.vertex_count()];
-    chart.elimination().iter().zip(0..).for_each(|(v, n)| turn[v.index()] = n);
+    for (v, n) in chart.elimination().iter().zip(0..) {
+        turn[v.index()] = n;
+    }
+    // The vertex of turn n has the key 2n + 1, and the nodes of edges that go before it have 2n. Keys of several nodes
+    // may be equal: the number of the node, second in each pair, decides.
     let mut keyed: Vec<(u64, usize)> = Vec::with_capacity(chart.node_count());
     for (_, sides) in chart.edges().iter() {
         let [a, b] = chart.ends(sides[0]).map(|v| turn[v.index()]);
         keyed.push((2 * a.min(b), chart.mid_node(sides[0])));
     }
-    keyed.extend((0..).map(VertexId).zip(&turn).map(|(v, n)| (2 * n + 1, chart.vertex_node(v))));
+    for (v, n) in (0..).map(VertexId).zip(&turn) {
+        keyed.push((2 * n + 1, chart.vertex_node(v)));
+    }
     keyed.sort_unstable();
     keyed.into_iter().map(|(_, node)| node).collect()
 }

@@ -16,6 +16,27 @@ use std::f64::consts::TAU;
 ///
 /// Vertices: those of the chart, then one centre per hole. Nodes of the quadratic elements: vertices of the chart
 /// `0..V`, mid-edge nodes of the chart `V..N`, centres, mid-edge nodes of the spokes.
+///
+/// # Example
+///
+/// A plate with two square holes: each gets a fan of four triangles around a centre.
+///
+/// ```
+/// use planish_core::map::filled::FilledChart;
+/// use planish_core::{decompose, repair, shapes};
+///
+/// let mesh = repair(&shapes::disk_with_holes(13, 2), &Default::default())?.mesh;
+/// let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()])?;
+/// let chart = FilledChart::new(&atlas.charts()[0]);
+/// assert_eq!(chart.loops().len(), 2);
+/// assert_eq!(chart.triangles().len() - chart.chart_triangles(), 2 * 4);
+/// // Two centres, and four spokes to each: no node of these is part of the result.
+/// assert_eq!(chart.node_count() - chart.chart_nodes(), 2 + 2 * 4);
+/// assert_eq!(chart.centre_node(0), chart.chart_nodes());
+/// // The nodes of a triangle: vertices, then the middles of its edges.
+/// assert!(chart.nodes(0)[..3].iter().all(|n| *n < chart.chart_vertices()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct FilledChart {
     triangles: Vec<[VertexId; 3]>,
@@ -40,8 +61,11 @@ impl FilledChart {
             let centre = VertexId::at(chart_vertices + k);
             let lengths: Vec<f64> = hole.iter().map(|h| chart.length(*h)).collect();
             let longest = lengths.iter().fold(0.0_f64, |m, l| m.max(*l));
-            let leg = (lengths.iter().sum::<f64>() / TAU).max(longest / 3.0_f64.sqrt());
+            let perimeter = lengths.iter().sum::<f64>();
+            // The radius of a circle of this perimeter. Legs are longer than half of the longest side by a margin.
+            let leg = (perimeter / TAU).max(longest / 3.0_f64.sqrt());
             for (h, length) in hole.iter().zip(&lengths) {
+                // The other way round: the fan lies on the other side of the loop.
                 let [from, to] = ends(&triangles, *h);
                 triangles.push([to, from, centre]);
                 shapes.push(TriangleShape { lengths: [*length, leg, leg] });

@@ -11,6 +11,7 @@
 //! Guarantees: in a [`LinearMap`] every triangle, those of virtual fans included, turns left, exactly.
 
 use crate::fem::assembly::Assembly;
+use crate::fem::bernstein::JacobianBezier;
 use crate::fem::dofs::Dofs;
 use crate::fem::sparse::{self, Analysis, Pattern, Unsolvable};
 use crate::grid::{GridPoint, orientation};
@@ -20,7 +21,8 @@ use crate::map::weights;
 use crate::monitor::{Interrupted, Monitor};
 use crate::topology::{EdgeId, FaceId, HalfEdgeId};
 
-/// After this many rounds of local changes, all negative edges are changed at once.
+/// After this many rounds of local changes, all negative edges are changed at once. By experience: each costs a
+/// factorisation, and the fewer edges change, the closer the map stays to the harmonic one.
 const LOCAL_ROUNDS: u32 = 6;
 
 /// How a linear map was found.
@@ -117,53 +119,87 @@ impl LinearMap {
 ///
 /// # Errors
 /// [`Error::Folded`] when the chart must be split; [`Error::Solver`]; [`Error::Interrupted`].
+///
+/// # Example
+///
+/// The smallest surface whose harmonic map folds: three triangles around a vertex, and one edge with a negative weight.
+///
+/// ```
+/// use planish_core::map::boundary::{Boundary, Mids};
+/// use planish_core::map::filled::FilledChart;
+/// use planish_core::map::linear::{Method, folded, harmonic_uv, linear_map};
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{decompose, repair, shapes};
+///
+/// let mesh = repair(&shapes::folding_three(), &Default::default())?.mesh;
+/// let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()])?;
+/// let chart = FilledChart::new(&atlas.charts()[0]);
+/// let boundary = Boundary::circle(&chart, Mids::Arc);
+/// let harmonic = harmonic_uv(&chart, &boundary, &NoMonitor)?;
+/// assert_eq!(folded(&chart, &harmonic).len(), 1);
+/// let map = linear_map(&chart, &boundary, &NoMonitor)?;
+/// assert!(folded(&chart, map.uv()).is_empty(), "this is what a linear map promises");
+/// assert_eq!((map.method(), map.edges_changed()), (Method::MMatrix, 1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn linear_map(chart: &FilledChart, boundary: &Boundary, monitor: &dyn Monitor) -> Result<LinearMap, Error> {
     let dofs = dofs(chart);
     let pattern = edge_pattern(chart, &dofs);
     let analysis = pattern.analyse_as_numbered()?;
     let system = System { chart, dofs: &dofs, prescribed: prescribed(chart, boundary), analysis, monitor };
     let harmonic = weights::harmonic(chart);
-    let (uv, mut folds) = attempt(&system, &harmonic)?;
-    let count = folds.len();
-    if count == 0 {
-        return Ok(LinearMap { uv, folded: 0, edges_changed: 0, method: Method::Harmonic });
+    let mut attempt = Attempt::by(&system, &harmonic)?;
+    if attempt.folds.is_empty() {
+        return Ok(LinearMap { uv: attempt.uv, folded: 0, edges_changed: 0, method: Method::Harmonic });
     }
+    let folded_by_harmonic = attempt.folds.len();
     let mean_value = weights::mean_value(chart);
     let positive = weights::replacements(chart, &harmonic, &mean_value);
     let mut changed = vec![false; harmonic.len()];
     for round in 0..=LOCAL_ROUNDS {
-        if !grow(chart, &harmonic, &folds, round == LOCAL_ROUNDS, &mut changed) {
+        let everywhere = round == LOCAL_ROUNDS;
+        if !grow(chart, &harmonic, &attempt.folds, everywhere, &mut changed) {
+            // The same weights would fold the same triangles; the last round may still find edges elsewhere.
             continue;
         }
         let pick = |e: usize| if changed[e] { positive[e] } else { harmonic[e] };
         let weights: Vec<f64> = (0..harmonic.len()).map(pick).collect();
-        let uv;
-        (uv, folds) = attempt(&system, &weights)?;
-        if folds.is_empty() {
+        attempt = Attempt::by(&system, &weights)?;
+        if attempt.folds.is_empty() {
             let edges_changed = changed.iter().filter(|c| **c).count();
-            return Ok(LinearMap { uv, folded: count, edges_changed, method: Method::MMatrix });
+            let method = Method::MMatrix;
+            return Ok(LinearMap { uv: attempt.uv, folded: folded_by_harmonic, edges_changed, method });
         }
     }
+    // The matrix had every chance to be an M-matrix: what folds now folds by rounding.
     let map = mean_value_map(chart, boundary, monitor)?;
-    Ok(LinearMap { folded: count, ..map })
+    Ok(LinearMap { folded: folded_by_harmonic, ..map })
 }
 
-/// The coordinates by symmetric weights and the triangles folded there: all of them, where the matrix is not positive
-/// definite in doubles.
-fn attempt(system: &System, weights: &[f64]) -> Result<(Vec<GridPoint>, Vec<FaceId>), Error> {
-    match system.solve(weights) {
-        Ok(uv) => {
-            let folds = folded(system.chart, &uv);
-            Ok((uv, folds))
+/// What symmetric weights give.
+struct Attempt {
+    /// The places of the vertices; none where the matrix is not positive definite in doubles.
+    uv: Vec<GridPoint>,
+    /// The triangles folded there; all of them where there are no places.
+    folds: Vec<FaceId>,
+}
+
+impl Attempt {
+    fn by(system: &System, weights: &[f64]) -> Result<Self, Error> {
+        match system.solve(weights) {
+            Ok(uv) => Ok(Self { folds: folded(system.chart, &uv), uv }),
+            // Negative weights may do that. It is no reason to give up: they change where triangles fold.
+            Err(sparse::Error::Unsolvable(Unsolvable::Singular { .. })) => {
+                let all = (0..system.chart.triangles().len()).map(FaceId::at);
+                Ok(Self { uv: Vec::new(), folds: all.collect() })
+            }
+            Err(error) => Err(error.into()),
         }
-        Err(sparse::Error::Unsolvable(Unsolvable::Singular { .. })) => {
-            Ok((Vec::new(), (0..system.chart.triangles().len()).map(FaceId::at).collect()))
-        }
-        Err(error) => Err(error.into()),
     }
 }
 
-/// The map by mean value weights.
+/// The map by mean value weights, which are always positive: it takes a general system, and several times as long as
+/// [`linear_map`] usually does. [`LinearMap::folded`] is not asked of the harmonic map, and 0.
 ///
 /// # Errors
 /// As [`linear_map`].
@@ -190,25 +226,35 @@ pub fn harmonic_uv(chart: &FilledChart, boundary: &Boundary, monitor: &dyn Monit
 
 /// The triangles that do not turn left, exactly.
 pub fn folded(chart: &FilledChart, uv: &[GridPoint]) -> Vec<FaceId> {
-    let corners = |t: &[crate::topology::VertexId; 3]| t.map(|v| uv[v.index()]);
-    let turns_left = |p: [GridPoint; 3]| orientation(p[0], p[1], p[2]) > 0;
-    let all = chart.triangles().iter().enumerate();
-    all.filter(|(_, t)| !turns_left(corners(t))).map(|(f, _)| FaceId::at(f)).collect()
+    let mut folded = Vec::new();
+    for (f, t) in chart.triangles().iter().enumerate() {
+        let [a, b, c] = t.map(|v| uv[v.index()]);
+        if orientation(a, b, c) <= 0 {
+            folded.push(FaceId::at(f));
+        }
+    }
+    folded
 }
 
 /// Marks the negative edges at the vertices of folded triangles (or all of them); whether that marked any more.
 fn grow(chart: &FilledChart, harmonic: &[f64], folds: &[FaceId], everywhere: bool, changed: &mut [bool]) -> bool {
-    let mut near = vec![everywhere; chart.vertex_count()];
-    folds.iter().flat_map(|f| chart.triangles()[f.index()]).for_each(|v| near[v.index()] = true);
-    let mut grown = false;
-    for (e, sides) in chart.edges().iter() {
-        let touches = chart.ends(sides[0]).iter().any(|v| near[v.index()]);
-        if sides.len() == 2 && harmonic[e.index()] < 0.0 && touches && !changed[e.index()] {
-            changed[e.index()] = true;
-            grown = true;
+    let mut is_near = vec![everywhere; chart.vertex_count()];
+    for f in folds {
+        for v in chart.triangles()[f.index()] {
+            is_near[v.index()] = true;
         }
     }
-    grown
+    let mut has_grown = false;
+    for (e, sides) in chart.edges().iter() {
+        // Edges of the outer loop join prescribed vertices: their weights change nothing.
+        let is_negative = sides.len() == 2 && harmonic[e.index()] < 0.0;
+        let touches = chart.ends(sides[0]).iter().any(|v| is_near[v.index()]);
+        if is_negative && touches && !changed[e.index()] {
+            changed[e.index()] = true;
+            has_grown = true;
+        }
+    }
+    has_grown
 }
 
 /// The unknowns of a linear map: vertices that are not on the outer loop, in the order of elimination.
@@ -272,7 +318,9 @@ fn solve_mean_value(
     let mut row_sums = vec![0.0; dofs.count()];
     for (e, sides) in chart.edges().iter() {
         let [a, b] = chart.ends(sides[0]).map(|v| v.index());
-        for (from, to, w) in [(a, b, weights[e.index()][0]), (b, a, weights[e.index()][1])] {
+        let [weight_at_a, weight_at_b] = weights[e.index()];
+        // Row by row: the sum of weight times (own value - neighbour's value) is zero.
+        for (from, to, w) in [(a, b, weight_at_a), (b, a, weight_at_b)] {
             let Some(row) = dofs.unknown(from) else { continue };
             row_sums[row] += w;
             match dofs.unknown(to) {
@@ -281,7 +329,9 @@ fn solve_mean_value(
             }
         }
     }
-    entries.extend(row_sums.iter().enumerate().map(|(i, s)| (i as u32, i as u32, *s)));
+    for (i, sum) in row_sums.iter().enumerate() {
+        entries.push((i as u32, i as u32, *sum));
+    }
     if dofs.count() > 0 {
         sparse::solve_general(dofs.count(), &entries, &mut rhs, 2, monitor)?;
         dofs.scatter(&rhs, &mut uv);
@@ -289,14 +339,40 @@ fn solve_mean_value(
     Ok(on_grid(&uv))
 }
 
-/// Lowers mid-edge nodes of `boundary` where the degree-elevated map would come close to a folded corner: where a triangle
+/// The least jacobian coefficient at which arcs are left alone, relative to that of the straight triangle. By experience:
+/// smaller leaves corners that are nearly folded, larger flattens more of the circle.
+const MARGIN: f64 = 0.01;
+
+/// Moves mid-edge nodes of `boundary` where the degree-elevated map would come close to a folded corner: where a triangle
 /// has two boundary edges (an ear), its corner angle on a smooth boundary tends to pi. The node goes half-way to
 /// the chord, and if that is not enough, to the chord.
+///
+/// # Example
+///
+/// Two corners of this plate are triangles with two boundary edges each.
+///
+/// ```
+/// use planish_core::map::boundary::{Boundary, Mids};
+/// use planish_core::map::filled::FilledChart;
+/// use planish_core::map::linear::{flatten_ear_arcs, linear_map};
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{decompose, repair, shapes};
+///
+/// let mesh = repair(&shapes::disk_with_holes(13, 2), &Default::default())?.mesh;
+/// let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()])?;
+/// let chart = FilledChart::new(&atlas.charts()[0]);
+/// let arcs = Boundary::circle(&chart, Mids::Arc);
+/// let linear = linear_map(&chart, &arcs, &NoMonitor)?;
+/// let mut boundary = arcs.clone();
+/// flatten_ear_arcs(&chart, &linear, &mut boundary);
+/// assert_eq!(boundary.vertices(), arcs.vertices());
+/// let moved = boundary.mids().iter().zip(arcs.mids()).filter(|(new, old)| new != old).count();
+/// assert_eq!(moved, 2 * 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn flatten_ear_arcs(chart: &FilledChart, linear: &LinearMap, boundary: &mut Boundary) {
-    /// The least coefficient that is left alone, relative to that of the straight triangle.
-    const MARGIN: f64 = 0.01;
     let mut nodes = linear.degree_elevated(chart, boundary);
-    // The edges of one triangle are lowered together, so that no order of them decides.
+    // The edges of one triangle are flattened together, so that no order of them decides.
     let outer = chart.outer();
     let face_of = |edge: usize| outer[edge].face().index();
     let mut edges: Vec<usize> = (0..outer.len()).collect();
@@ -304,10 +380,12 @@ pub fn flatten_ear_arcs(chart: &FilledChart, linear: &LinearMap, boundary: &mut 
     for ear in edges.chunk_by(|a, b| face_of(*a) == face_of(*b)) {
         let face = face_of(ear[0]);
         let [p, q, r] = chart.triangles()[face].map(|v| linear.uv[v.index()]);
+        // All six coefficients of a straight triangle are twice its area; they come doubled.
         let straight = 2.0 * orientation(p, q, r) as f64;
         for all_the_way in [false, true] {
-            let det = crate::fem::bernstein::JacobianBezier::new(chart.nodes(face).map(|n| nodes[n]));
-            let least = det.corner.iter().chain(&det.edge).fold(f64::INFINITY, |m, c| m.min(*c as f64));
+            let det = JacobianBezier::new(chart.nodes(face).map(|n| nodes[n]));
+            let coefficients = det.corner.iter().chain(&det.edge);
+            let least = coefficients.fold(f64::INFINITY, |least, c| least.min(*c as f64));
             if least > MARGIN * straight {
                 break;
             }

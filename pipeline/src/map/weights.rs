@@ -1,10 +1,11 @@
 //! Edge weights of linear maps: each vertex inside becomes the weighted mean of its neighbours.
 
 use crate::map::filled::FilledChart;
-use crate::topology::HalfEdgeId;
+use crate::topology::{EdgeId, HalfEdgeId};
 
-/// How far a negative weight is raised, relative to the mean value weight of the edge. (Raising to zero is not
-/// enough: it can leave triangles of area zero.)
+/// How far a negative weight is raised, relative to the mean value weight of the edge. Raising to zero is not enough: on
+/// [`folding_three`](crate::shapes::folding_three) it leaves a triangle of area zero. Larger is further from the
+/// harmonic map.
 const RAISED_TO: f64 = 0.1;
 
 /// The harmonic weight of every edge: half the sum of the cotangents of the opposite angles (Pinkall and Polthier
@@ -29,9 +30,10 @@ pub(crate) fn mean_value(chart: &FilledChart) -> Vec<[f64; 2]> {
             let h = HalfEdgeId::at(3 * f + k);
             let e = chart.edges().edge(h);
             let first = chart.ends(chart.edges().sides(e)[0])[0];
-            let forward = usize::from(chart.ends(h)[0] != first);
-            weights[e.index()][forward] += tangents[k] / shape.lengths[k];
-            weights[e.index()][1 - forward] += tangents[(k + 1) % 3] / shape.lengths[k];
+            // Which end of the edge the side begins at, corner k of the triangle; it ends at corner k + 1.
+            let begin = usize::from(chart.ends(h)[0] != first);
+            weights[e.index()][begin] += tangents[k] / shape.lengths[k];
+            weights[e.index()][1 - begin] += tangents[(k + 1) % 3] / shape.lengths[k];
         }
     }
     weights
@@ -41,19 +43,20 @@ pub(crate) fn mean_value(chart: &FilledChart) -> Vec<[f64; 2]> {
 /// both kinds of weights have the same sum around a vertex, and averaged over both ends (which keeps the matrix
 /// symmetric; the convex combination theorem asks for positive weights only).
 pub(crate) fn replacements(chart: &FilledChart, harmonic: &[f64], mean_value: &[[f64; 2]]) -> Vec<f64> {
-    let ends = |e: usize| chart.ends(chart.edges().sides(crate::topology::EdgeId::at(e))[0]);
-    let mut sums = vec![[0.0_f64; 2]; chart.vertex_count()];
+    let ends = |e: usize| chart.ends(chart.edges().sides(EdgeId::at(e))[0]).map(|v| v.index());
+    // Per vertex, the sums of both kinds of weights over its edges.
+    let mut harmonic_sums = vec![0.0_f64; chart.vertex_count()];
+    let mut mean_value_sums = vec![0.0_f64; chart.vertex_count()];
     for e in 0..harmonic.len() {
-        for (v, mv) in ends(e).into_iter().zip(mean_value[e]) {
-            sums[v.index()][0] += harmonic[e].abs();
-            sums[v.index()][1] += mv;
+        for (v, weight) in ends(e).into_iter().zip(mean_value[e]) {
+            harmonic_sums[v] += harmonic[e].abs();
+            mean_value_sums[v] += weight;
         }
     }
-    let scale = |v: crate::topology::VertexId| sums[v.index()][0] / sums[v.index()][1];
-    (0..harmonic.len())
-        .map(|e| {
-            let [a, b] = ends(e);
-            RAISED_TO * 0.5 * (scale(a) * mean_value[e][0] + scale(b) * mean_value[e][1])
-        })
-        .collect()
+    let mut positive = Vec::with_capacity(harmonic.len());
+    for e in 0..harmonic.len() {
+        let [a, b] = ends(e).map(|v| harmonic_sums[v] / mean_value_sums[v]);
+        positive.push(RAISED_TO * 0.5 * (a * mean_value[e][0] + b * mean_value[e][1]));
+    }
+    positive
 }

@@ -29,20 +29,24 @@ pub type Principal = [Vec3; 2];
 impl Curvature {
     /// Half-way between two points.
     pub fn between(&self, other: &Self) -> Self {
-        let mean = |k| 0.5 * (self.tensor[k] + other.tensor[k]);
-        let sum = [0, 1, 2].map(|k| self.normal[k] + other.normal[k]);
-        Self { tensor: [mean(0), mean(1), mean(2), mean(3), mean(4), mean(5)], normal: sum }
+        let tensor = std::array::from_fn(|k| 0.5 * (self.tensor[k] + other.tensor[k]));
+        // Its length does not count.
+        let normal = [0, 1, 2].map(|k| self.normal[k] + other.normal[k]);
+        Self { tensor, normal }
     }
 
     /// The principal curvatures within the tangent plane, for a surface whose lengths are multiplied by `scale`.
     pub fn principal(&self, scale: f64) -> Principal {
         let [e, f] = frame(self.normal);
+        // The matrix (a b, b c) in the tangent plane has the eigenvalues mean + radius and mean - radius.
         let (a, b, c) = (self.along(e, e), self.along(e, f), self.along(f, f));
-        let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
+        let mean = 0.5 * (a + c);
+        let half = 0.5 * (a - c);
         let radius = (half * half + b * b).sqrt();
         // The eigenvector of mean + radius, by the row of the matrix that does not cancel.
         let v = if half >= 0.0 { [half + radius, b] } else { [b, radius - half] };
         let length = (v[0] * v[0] + v[1] * v[1]).sqrt();
+        // Where all directions have the same curvature, any will do.
         let v = if length > 0.0 { v.map(|x| x / length) } else { [1.0, 0.0] };
         let in_space = |v: [f64; 2], k: f64| {
             let k = (k.clamp(-LARGEST, LARGEST) * scale).clamp(f64::MIN, f64::MAX);
@@ -50,9 +54,11 @@ impl Curvature {
         };
         let first = in_space(v, mean + radius);
         let second = in_space([-v[1], v[0]], mean - radius);
+        // The larger by magnitude comes first.
         if mean >= 0.0 { [first, second] } else { [second, first] }
     }
 
+    /// p^T tensor q.
     fn along(&self, p: Vec3, q: Vec3) -> f64 {
         let [xx, yy, zz, xy, yz, zx] = self.tensor;
         p[0] * (xx * q[0] + xy * q[1] + zx * q[2])
@@ -129,16 +135,21 @@ impl<'a> Faces<'a> {
         let triangles = self.mesh.triangles();
         let mut cells = vec![Measure::default(); groups];
         for (t, area) in triangles.iter().zip(&self.areas) {
-            t.iter().for_each(|v| cells[self.group_of(*v)].area += area / 3.0);
+            for v in t {
+                cells[self.group_of(*v)].area += area / 3.0;
+            }
         }
         for (_, sides) in self.mesh.edges().iter() {
+            // Only edges between two triangles have a dihedral angle.
             let [g, h] = *sides else { continue };
             let t = triangles[g.face().index()];
             let ends = [t[g.side()], t[(g.side() + 1) % 3]];
             let along = sub(self.points[ends[1].index()], self.points[ends[0].index()]);
             let [left, right] = [g, h].map(|h| self.normals[h.face().index()]);
             let half = edge_measure(along, left, right).map(|x| 0.5 * x);
-            ends.iter().for_each(|v| cells[self.group_of(*v)].add(half, 0.0));
+            for v in ends {
+                cells[self.group_of(v)].add(half, 0.0);
+            }
         }
         cells
     }
@@ -146,18 +157,48 @@ impl<'a> Faces<'a> {
 
 /// The curvature at each group of vertices of `mesh` that `group` gives the same number below `groups`: copies of
 /// one vertex in several sheets share theirs.
+///
+/// # Example
+///
+/// A tube of radius 2 bends by a half around, and not along.
+///
+/// ```
+/// use planish_core::measure::curvature::measure;
+/// use planish_core::mesh::TriangleSoup;
+/// use planish_core::vec3::norm;
+/// use planish_core::{repair, shapes};
+///
+/// let tube = shapes::tube(48, 4, 1.0);
+/// let doubled = tube.points().iter().map(|p| p.map(|c| 2.0 * c)).collect();
+/// let mesh = repair(&TriangleSoup::new(doubled, tube.triangles().to_vec())?, &Default::default())?.mesh;
+/// // Every vertex is a group of its own.
+/// let groups: Vec<u32> = (0..mesh.points().len() as u32).collect();
+/// let curvatures = measure(&mesh, &groups, groups.len());
+/// // Measured in the unit of the metric; the scale of that leads back to the unit of the input.
+/// let half_way_up = 2 * 48;
+/// let [largest, smallest] = curvatures[half_way_up].principal(mesh.metric().scale);
+/// assert!((norm(largest) - 0.5).abs() < 0.01 && norm(smallest) < 0.01);
+/// // Each is a direction, too: around means across the axis.
+/// assert!(largest[2].abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn measure(mesh: &SurfaceMesh, group: &[u32], groups: usize) -> Vec<Curvature> {
     let faces = Faces::new(mesh, group);
     let cells = faces.cells(groups);
     let mut stars = vec![Star::default(); groups];
     for (face, t) in mesh.triangles().iter().enumerate() {
         let corners = t.map(|v| faces.group_of(v));
+        // The cells of the triangle's corners, added to the star of each of them.
         let mut around = Measure::default();
-        corners.iter().for_each(|c| around.add(cells[*c].tensor, cells[*c].area));
-        for corner in corners {
-            let star = &mut stars[corner];
+        for c in corners {
+            around.add(cells[c].tensor, cells[c].area);
+        }
+        for c in corners {
+            let star = &mut stars[c];
             star.measure.add(around.tensor, around.area);
-            (0..3).for_each(|k| star.normal[k] += faces.areas[face] * faces.normals[face][k]);
+            for k in 0..3 {
+                star.normal[k] += faces.areas[face] * faces.normals[face][k];
+            }
         }
     }
     stars.into_iter().map(Star::curvature).collect()

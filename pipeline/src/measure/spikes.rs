@@ -25,10 +25,12 @@ use std::f64::consts::{PI, TAU};
 /// Frontal-Delaunay and MeshAdapt leave out by 1.4 edges, have 0.5.
 const THIN: f64 = 0.6;
 
-/// How often the edge length is halved.
+/// How often the edge length is halved: each time is another look at what was found, and elements become four times as
+/// many there.
 const HALVINGS: u32 = 3;
 
-/// The radius of the balls, in edges.
+/// The radius of the balls, in edges. By experience: smaller balls find thinner places only, larger ones reach beyond
+/// their chart more often, and then tell nothing.
 const REACH: f64 = 2.0;
 
 /// A mesh follows a cone as far as so many edges go around it; but from further away than [`FURTHEST`] edges none is looked
@@ -56,26 +58,61 @@ pub struct Spike {
 
 /// The spikes and pits inside `charts` that a mesh with edges of length `size` would cut off, from the widest to the
 /// thinnest. `curvatures` are those of the vertices of `mesh`, more may follow.
+///
+/// # Example
+///
+/// A cone of twelve facets: its tip is sharp for elements of any size, so that all halvings find it.
+///
+/// ```
+/// use planish_core::measure::{curvature::measure, spikes::spikes};
+/// use planish_core::mesh::TriangleSoup;
+/// use planish_core::{decompose, repair};
+///
+/// let on_ring = |j: u32| (f64::from(j) * std::f64::consts::TAU / 12.0).sin_cos();
+/// let ring = (0..12).map(on_ring).map(|(sin, cos)| [cos, sin, 0.0]);
+/// let points = std::iter::once([0.0, 0.0, 5.0]).chain(ring).collect();
+/// let facets = (0..12).map(|j| [0, 1 + j, 1 + (j + 1) % 12]).collect();
+/// let mesh = repair(&TriangleSoup::new(points, facets)?, &Default::default())?.mesh;
+/// let atlas = decompose::assemble(&mesh, &[0; 12])?;
+/// let groups: Vec<u32> = (0..mesh.points().len() as u32).collect();
+/// let curvatures = measure(&mesh, &groups, groups.len());
+/// let curvatures: Vec<_> = curvatures.iter().map(|c| c.principal(mesh.metric().scale)).collect();
+/// let found = spikes(&mesh, atlas.charts(), &curvatures, 0.05);
+/// // From the widest to the thinnest, and how long edges should be there.
+/// assert!(found.iter().all(|s| s.centre == [0.0, 0.0, 5.0]));
+/// assert!(found.iter().map(|s| s.size).eq([0.05 / 2.0, 0.05 / 4.0, 0.05 / 8.0]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn spikes<C: AsRef<Chart>>(mesh: &SurfaceMesh, charts: &[C], curvatures: &[Principal], size: f64) -> Vec<Spike> {
     let mut search = Search::new(mesh, charts);
-    let bends: Vec<f64> = angles(mesh)
-        .iter()
-        .zip(curvatures)
-        .map(|(a, [k, l])| if *a < THIN * TAU { f64::INFINITY } else { norm(*k).max(norm(*l)) })
-        .collect();
+    let bends = bends(mesh, curvatures);
     let mut found = Vec::new();
     let mut wanted = vec![true; mesh.points().len()];
     for halved in 0..HALVINGS {
         let size = size * 0.5_f64.powi(halved as i32);
-        let candidates = (0..wanted.len()).filter(|v| wanted[*v] && bends[*v] * size > BENT);
-        let thin = search.thin(&candidates.collect::<Vec<_>>(), REACH * size);
+        let is_bent = |v: &usize| wanted[*v] && bends[*v] * size > BENT;
+        let candidates: Vec<usize> = (0..wanted.len()).filter(is_bent).collect();
+        let thin = search.thin(&candidates, REACH * size);
         if thin.is_empty() {
             break;
         }
+        // With half the edge length only what was thin with the whole is looked at.
         wanted = search.within.clone();
         found.extend(thin.iter().map(|place| place.spike(mesh, size)));
     }
     found
+}
+
+/// How much the surface bends at each vertex: its larger curvature, without bound where its angles add up to little (see
+/// [`BENT`]).
+fn bends(mesh: &SurfaceMesh, curvatures: &[Principal]) -> Vec<f64> {
+    let angles = angles(mesh);
+    let mut bends = Vec::with_capacity(angles.len());
+    for (angle, [largest, smallest]) in angles.iter().zip(curvatures) {
+        let is_pointed = *angle < THIN * TAU;
+        bends.push(if is_pointed { f64::INFINITY } else { norm(*largest).max(norm(*smallest)) });
+    }
+    bends
 }
 
 /// The sum of the angles around each vertex.
@@ -126,13 +163,18 @@ impl<'a> Search<'a> {
     fn new<C: AsRef<Chart>>(mesh: &'a SurfaceMesh, charts: &[C]) -> Self {
         let mut chart = vec![None; mesh.triangles().len()];
         for (number, part) in charts.iter().map(AsRef::as_ref).enumerate() {
-            part.faces().iter().for_each(|f| chart[f.index()] = Some(ChartId::at(number)));
+            for f in part.faces() {
+                chart[f.index()] = Some(ChartId::at(number));
+            }
         }
         let mut beside = vec![None; mesh.points().len()];
         for (face, t) in mesh.triangles().iter().enumerate() {
-            t.iter().for_each(|v| beside[v.index()] = Some(FaceId::at(face)));
+            for v in t {
+                beside[v.index()] = Some(FaceId::at(face));
+            }
         }
-        let (seen, within) = (VisitStamps::new(chart.len()), vec![false; beside.len()]);
+        let seen = VisitStamps::new(chart.len());
+        let within = vec![false; beside.len()];
         Self { mesh, chart, beside, seen, queue: Vec::new(), within }
     }
 
@@ -145,6 +187,7 @@ impl<'a> Search<'a> {
             let Some(beside) = self.beside[v].filter(|_| !is_done[v]) else { continue };
             let share = self.thin_share(v, beside, radius);
             let is_thin = share.is_some();
+            // What is as near is not looked at again: so a triangle lies in a bounded number of balls.
             let done = radius * if is_thin { 0.5 } else { 0.125 };
             for face in &self.queue {
                 for corner in self.mesh.triangles()[face.index()] {
@@ -177,7 +220,9 @@ impl<'a> Search<'a> {
             }
             for h in face.sides() {
                 let ends = [corners[h.side()], corners[h.next().side()]];
-                if on_segment(centre, ends).squared < radius * radius && !self.cross(h) {
+                let is_within = on_segment(centre, ends).squared < radius * radius;
+                // The ball reaches beyond the chart.
+                if is_within && !self.cross(h) {
                     return None;
                 }
             }
@@ -185,6 +230,7 @@ impl<'a> Search<'a> {
         Some(area / disk)
     }
 
+    /// Queues a triangle, unless the walk has been there.
     fn reach(&mut self, face: FaceId) {
         if self.seen.visit(face.index()) {
             self.queue.push(face);
@@ -194,9 +240,13 @@ impl<'a> Search<'a> {
     /// Walks to the other side of an edge; not if it lies in another chart, or there is none.
     fn cross(&mut self, h: HalfEdgeId) -> bool {
         let chart = |h: HalfEdgeId| self.chart[h.face().index()];
-        let Some(twin) = self.mesh.edges().twin(h).filter(|twin| chart(*twin) == chart(h)) else { return false };
-        self.reach(twin.face());
-        true
+        match self.mesh.edges().twin(h) {
+            Some(twin) if chart(twin) == chart(h) => {
+                self.reach(twin.face());
+                true
+            }
+            _ => false,
+        }
     }
 }
 
@@ -210,6 +260,7 @@ fn area_within(corners: [Vec3; 3], centre: Vec3, radius: f64) -> f64 {
     if doubled == 0.0 {
         return 0.0;
     }
+    // The ball cuts a disk out of the triangle's plane, around the foot of the perpendicular.
     let normal = normal.map(|c| c / doubled);
     let height = dot(sub(centre, corners[0]), normal);
     let squared = radius * radius - height * height;
@@ -218,7 +269,8 @@ fn area_within(corners: [Vec3; 3], centre: Vec3, radius: f64) -> f64 {
     }
     let foot = [0, 1, 2].map(|k| centre[k] - height * normal[k]);
     let [a, b, c] = corners.map(|p| sub(p, foot));
-    [[a, b], [b, c], [c, a]].iter().map(|s| sector_within(*s, normal, squared)).sum::<f64>().max(0.0)
+    let sectors = [[a, b], [b, c], [c, a]].map(|side| sector_within(side, normal, squared));
+    sectors.iter().sum::<f64>().max(0.0)
 }
 
 /// The signed area of the part of the triangle between the origin and a segment that lies within a circle around the
@@ -226,6 +278,7 @@ fn area_within(corners: [Vec3; 3], centre: Vec3, radius: f64) -> f64 {
 fn sector_within([a, b]: [Vec3; 2], normal: Vec3, squared: f64) -> f64 {
     let doubled = |p: Vec3, q: Vec3| dot(cross(p, q), normal);
     let sector = |p: Vec3, q: Vec3| 0.5 * squared * doubled(p, q).atan2(dot(p, q));
+    // |a + t along|^2 = squared is a quadratic equation in t.
     let along = sub(b, a);
     let (length, middle) = (dot(along, along), dot(a, along));
     let discriminant = middle * middle - length * (dot(a, a) - squared);
@@ -240,6 +293,7 @@ fn sector_within([a, b]: [Vec3; 2], normal: Vec3, squared: f64) -> f64 {
     if leaves <= 0.0 || enters >= 1.0 {
         return sector(a, b);
     }
+    // Up to where it enters and from where it leaves the circle, a sector; a triangle in between.
     let at = |t: f64| [0, 1, 2].map(|k| a[k] + t * along[k]);
     let (p, q) = (at(enters.max(0.0)), at(leaves.min(1.0)));
     sector(a, p) + 0.5 * doubled(p, q) + sector(q, b)

@@ -39,10 +39,14 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Clone, Debug)]
 pub struct LinearAtlas {
     points: Vec<Vec3>,
+    /// Per point.
     curvatures: Vec<Principal>,
     charts: Vec<LinearChart>,
+    /// Per curve of the network, the points along it.
     curves: Vec<Vec<u32>>,
+    /// The charts that are handed over by the straight map that was given for them.
     straight: Vec<ChartId>,
+    /// The charts that are handed over by the map from which their untangling started, with arcs or with chords.
     linear: Vec<ChartId>,
     refined: usize,
     moved: usize,
@@ -51,9 +55,13 @@ pub struct LinearAtlas {
 /// One chart: a triangulation in space and in the plane.
 #[derive(Clone, Debug, Default)]
 pub struct LinearChart {
+    /// Per node of the chart, the point of the atlas.
     nodes: Vec<u32>,
+    /// Per node of the chart.
     uv: Vec<GridPoint>,
+    /// By nodes of the chart.
     triangles: Vec<[u32; 3]>,
+    /// Per triangle, the curved triangle of the chart that it is a part of.
     faces: Vec<u32>,
 }
 
@@ -185,6 +193,35 @@ impl LinearChart {
 ///
 /// # Panics
 /// If `straight` has not one entry for every chart, or a map of another chart.
+///
+/// # Example
+///
+/// A torus in four straight triangles for each of its own, and the nodes on its seams shared by the charts beside them.
+///
+/// ```
+/// use planish_core::grid::orientation;
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{Settings, parametrize, shapes, subdivide};
+///
+/// let atlas = parametrize(&shapes::ring_torus(12, 8), &Settings::default(), &NoMonitor)?;
+/// let linear = subdivide(&atlas, &vec![None; atlas.charts().len()])?;
+/// assert_eq!(linear.triangle_count(), 4 * atlas.mesh().triangles().len());
+/// for chart in linear.charts() {
+///     // In the plane every triangle turns left, exactly.
+///     assert!(chart.triangles().iter().all(|t| {
+///         let [a, b, c] = t.map(|n| chart.uv()[n as usize]);
+///         orientation(a, b, c) > 0
+///     }));
+/// }
+/// // The nodes of a curve are nodes of the charts on both of its sides.
+/// for (curve, nodes) in atlas.seams().curves().iter().zip(linear.curves()) {
+///     for side in curve.sides() {
+///         let of_chart = linear.charts()[side.chart.index()].nodes();
+///         assert!(nodes.iter().all(|n| of_chart.contains(n)));
+///     }
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn subdivide(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<LinearAtlas, Error> {
     let mesh = atlas.mesh();
     assert_eq!(straight.len(), atlas.charts().len(), "an entry for every chart");
@@ -194,11 +231,15 @@ pub fn subdivide(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> R
     }
     refuse_self_contact(atlas.seams(), atlas.charts().len())?;
     let Split { nodes, charts, by, refined } = split(atlas, straight)?;
-    let those = |which: &dyn Fn(HandedOver) -> bool| {
-        (0..by.len()).filter(|c| which(by[*c])).map(ChartId::at).collect::<Vec<ChartId>>()
-    };
-    let straight = those(&|by| by == HandedOver::Straight);
-    let linear = those(&|by| matches!(by, HandedOver::Start | HandedOver::Chords));
+    let mut straight = Vec::new();
+    let mut linear = Vec::new();
+    for (chart, by) in (0..).map(ChartId).zip(by) {
+        match by {
+            HandedOver::Straight => straight.push(chart),
+            HandedOver::Certified => {}
+            HandedOver::Start | HandedOver::Chords => linear.push(chart),
+        }
+    }
     let mut points = nodes.positions(mesh);
     let moved = normals::separate(&mut points, &charts, mesh.bounding_box().diagonal())?;
     let curves = atlas.seams().curves().iter().map(|c| nodes.along(c)).collect();
@@ -251,13 +292,15 @@ fn split(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<Sp
         None => (HandedOver::Certified, certified(c)),
     };
     let (mut by, mut chosen): (Vec<HandedOver>, Vec<Proven>) = (0..charts.len()).map(first).unzip();
+    // It ends: in each turn a chart gets a plainer map, and there are four kinds of them.
     loop {
         let mut nodes = Nodes::new(atlas);
         let current: Vec<&PlanarMap> = chosen.iter().map(Proven::map).collect();
-        let mut split: Vec<LinearChart> =
-            charts.iter().zip(&current).map(|(c, m)| quartered(mesh, c.chart(), m, &nodes)).collect();
+        let quarters = charts.iter().zip(&current).map(|(c, m)| quartered(mesh, c.chart(), m, &nodes));
+        let mut split: Vec<LinearChart> = quarters.collect();
         let failed = match refine::refine(refine::DEPTH, atlas, &current, &mut nodes, &mut split) {
             Ok(refined) => {
+                // The polygon that was proven may have got more nodes, which are rounded.
                 let is_straight = |c: &usize| by[*c] == HandedOver::Straight;
                 let touches = |c: &usize| touches_itself(&split[*c], ChartId::at(*c), network, &nodes);
                 let touching: Vec<usize> = (0..by.len()).filter(is_straight).filter(touches).collect();
@@ -292,17 +335,21 @@ fn touches_itself(chart: &LinearChart, id: ChartId, network: &SeamNetwork, nodes
     if !network.loops(id).iter().flatten().any(|p| is_halved(curve(p), nodes)) {
         return false;
     }
-    let local: BTreeMap<u32, GridPoint> = chart.nodes.iter().copied().zip(chart.uv.iter().copied()).collect();
-    let along = |p: &Passage| {
-        let mut along = nodes.along(curve(p));
-        if !p.forward {
-            along.reverse();
+    let uv_of: BTreeMap<u32, GridPoint> = chart.nodes.iter().copied().zip(chart.uv.iter().copied()).collect();
+    let mut polygons = Vec::new();
+    for boundary_loop in network.loops(id) {
+        let mut polygon = Vec::new();
+        for passage in boundary_loop {
+            let mut along = nodes.along(curve(passage));
+            if !passage.forward {
+                along.reverse();
+            }
+            // The next passage begins where this one ends.
+            along.pop();
+            polygon.extend(along.iter().map(|n| uv_of[n]));
         }
-        along.pop();
-        along
-    };
-    let polygon = |turn: &Vec<Passage>| turn.iter().flat_map(along).map(|n| local[&n]).collect();
-    let polygons: Vec<Vec<GridPoint>> = network.loops(id).iter().map(polygon).collect();
+        polygons.push(polygon);
+    }
     polygons::check(&polygons).is_some()
 }
 
@@ -325,6 +372,7 @@ fn blamed(
     nodes: &Nodes,
 ) -> Result<BTreeMap<usize, Inverted>, Inverted> {
     let mut blamed = BTreeMap::new();
+    // Found once, where it is asked for at all.
     let mut halved = None;
     for inverted in failed {
         let chart = inverted.chart.index();
@@ -348,8 +396,10 @@ fn blamed(
 fn beside_halved_curves(charts: usize, network: &SeamNetwork, nodes: &Nodes) -> Vec<BTreeSet<usize>> {
     let mut beside = vec![BTreeSet::new(); charts];
     for curve in network.curves().iter().filter(|c| is_halved(c, nodes)) {
-        for (a, b) in curve.sides().iter().flat_map(|a| curve.sides().iter().map(move |b| (a, b))) {
-            beside[a.chart.index()].insert(b.chart.index());
+        for a in curve.sides() {
+            for b in curve.sides() {
+                beside[a.chart.index()].insert(b.chart.index());
+            }
         }
     }
     beside

@@ -12,9 +12,15 @@ const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 /// p0, c and p1 relative to the centre, as combinations of the four nodes.
 const POINTS: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, -1.0], [-0.5, 2.0, -0.5, -1.0], [0.0, 0.0, 1.0, -1.0]];
 
+/// The Bezier points p0, c, p1 of the arc relative to its centre.
 fn points(x: &ArcNodes) -> [[f64; 2]; 3] {
-    let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
-    POINTS.map(|c| [0, 1].map(|k| (0..4).map(|n| c[n] * d[n][k]).sum()))
+    // Differences to the first node, so that small holes lose no digits: the weights of each point sum to zero.
+    let from_first = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
+    POINTS.map(|weights| combination(&weights, &from_first))
+}
+
+fn combination(weights: &[f64; 4], x: &ArcNodes) -> [f64; 2] {
+    [0, 1].map(|component| (0..4).map(|n| weights[n] * x[n][component]).sum())
 }
 
 /// The products, positive where the loop is star-shaped (traversed with the chart on its left).
@@ -35,9 +41,11 @@ pub(super) fn gradient(x: &ArcNodes, k: usize) -> [f64; 8] {
     let (i, j) = PAIRS[k];
     let mut g = [0.0; 8];
     for n in 0..4 {
-        let (ga, gb) = (POINTS[i][n], POINTS[j][n]);
-        g[2 * n] = -(ga * p[j][1] - gb * p[i][1]);
-        g[2 * n + 1] = -(gb * p[i][0] - ga * p[j][0]);
+        // Node n moves point i by the first of these, and point j by the second.
+        let in_first = POINTS[i][n];
+        let in_second = POINTS[j][n];
+        g[2 * n] = -(in_first * p[j][1] - in_second * p[i][1]);
+        g[2 * n + 1] = -(in_second * p[i][0] - in_first * p[j][0]);
     }
     g
 }

@@ -64,6 +64,7 @@ struct Wirtinger {
 impl Wirtinger {
     fn at_corners(shape: &TriangleShape) -> Self {
         let [_, [length, _], [x, y]] = shape.in_plane();
+        // Half of sqrt(2 area): df/dz is half of df/dx - i df/dy.
         let half = 0.5 * (length * y).sqrt();
         // The gradients of the basis in the plane of the triangle.
         let gradients = |corner: usize| -> [[f64; 2]; 6] {
@@ -72,12 +73,14 @@ impl Wirtinger {
                 [half * first, half * (eta - x * first) / y]
             })
         };
-        let form = |corner: usize, sign: f64| {
-            let g = gradients(corner);
-            ComplexForm { re: g.map(|g| g[0]), im: g.map(|g| sign * g[1]) }
-        };
-        Self { z: [0, 1, 2].map(|k| form(k, -1.0)), conj_z: [0, 1, 2].map(|k| form(k, 1.0)) }
+        let at_corners = [0, 1, 2].map(gradients);
+        Self { z: at_corners.map(|g| form(g, -1.0)), conj_z: at_corners.map(|g| form(g, 1.0)) }
     }
+}
+
+/// The form whose coefficients are the first components, and `sign` times i times the second ones.
+fn form(gradients: [[f64; 2]; 6], sign: f64) -> ComplexForm {
+    ComplexForm { re: gradients.map(|g| g[0]), im: gradients.map(|g| sign * g[1]) }
 }
 
 #[cfg(test)]

@@ -21,10 +21,12 @@ const WEIGHTS: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 const STEPS: [usize; 2] = [12, 60];
 const WORK: usize = 120_000;
 
-/// A weight is left when the promised decrease falls below this share of the energy.
+/// A weight is left when the promised decrease falls below this share of the energy. Far below what the smallest weight
+/// costs.
 const TOLERANCE: f64 = 1e-9;
 
-/// The share of its value in the start that every coefficient keeps.
+/// The share of its value in the start that every coefficient keeps. By experience: larger bars more of the valid maps,
+/// smaller leaves less to what rounding to the grid takes.
 const KEPT: f64 = 1e-3;
 
 /// What triangles weigh at least, relative to the mean: where the objective is nothing a barrier is wanted all the same.
@@ -47,8 +49,10 @@ pub(super) fn untangle<O: Objective>(
     let weights = weights(chart, objective, &all);
     let mut problem = problem(chart, objective, &weights, checkpoint);
     let mut x = problem.gather(&all);
-    problem
-        .for_each_bound(&x, |c, bound| *bound = Bound { scale: c, floor: KEPT * c, weight: bound.weight, dual: None });
+    problem.for_each_bound(&x, |coefficient, bound| {
+        bound.scale = coefficient;
+        bound.floor = KEPT * coefficient;
+    });
     descend(&mut problem, &mut x, stats)?;
     for moved in problem.moved(&x) {
         all[moved.node] = moved.uv;
@@ -69,7 +73,8 @@ fn weights<O: Objective>(chart: &FilledChart, objective: &O, x: &[[f64; 2]]) -> 
     let value = |f: usize| objective.value(FaceId::at(f), &chart.nodes(f).map(|n| x[n]));
     let values: Vec<f64> = (0..chart.triangles().len()).map(value).collect();
     let mean = values.iter().sum::<f64>() / chart.chart_triangles() as f64;
-    Weights { of_faces: values.into_iter().map(|v| v.max(MIN_WEIGHT * mean)).collect(), mean }
+    let of_faces = values.into_iter().map(|v| v.max(MIN_WEIGHT * mean)).collect();
+    Weights { of_faces, mean }
 }
 
 /// All triangles, with their weights but bounds still unset; every node may move but those of the outer loop.
@@ -80,14 +85,17 @@ fn problem<'a, O: Objective>(
     checkpoint: &'a Checkpoint,
 ) -> Problem<'a, O> {
     let unset = |weight: f64| Bound { scale: 1.0, floor: 0.0, weight, dual: None };
-    let cell = |f: usize| Cell {
-        face: FaceId::at(f),
-        bounds: (f < chart.chart_triangles()).then(|| [unset(weights.of_faces[f]); 6]),
-    };
-    let cells = (0..chart.triangles().len()).map(cell).collect();
+    let mut cells = Vec::with_capacity(chart.triangles().len());
+    for f in 0..chart.triangles().len() {
+        // Fans have energy, and may fold.
+        let is_of_chart = f < chart.chart_triangles();
+        let bounds = is_of_chart.then(|| [unset(weights.of_faces[f]); 6]);
+        cells.push(Cell { face: FaceId::at(f), bounds });
+    }
     let is_outer = chart.outer_nodes();
-    let centres = chart.node_count()..chart.node_count() + chart.loops().len();
-    let free: Vec<u32> = (0..is_outer.len()).filter(|n| !is_outer[*n]).chain(centres).map(|n| n as u32).collect();
+    let inside = (0..is_outer.len()).filter(|n| !is_outer[*n]);
+    let star_centres = chart.node_count()..chart.node_count() + chart.loops().len();
+    let free: Vec<u32> = inside.chain(star_centres).map(|n| n as u32).collect();
     let arcs = region::arc_cells(chart, |_| true, unset(weights.mean));
     Problem::new(chart, objective, cells, arcs, &free, checkpoint)
 }
@@ -102,6 +110,7 @@ fn descend<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &m
     let analysis = pattern.analyse()?;
     let steps = (WORK / problem.cells.len()).clamp(STEPS[0], STEPS[1]);
     let limits = Limits { steps, tolerance: TOLERANCE };
+    // Weights are shares of what `weights` found: they are scaled from one to the next.
     let mut last = 1.0;
     for weight in WEIGHTS {
         problem.scale_weights(weight / last);

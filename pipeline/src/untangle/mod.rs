@@ -90,7 +90,7 @@ fn nodes_moved(chart: &FilledChart, nodes: &[GridPoint], harmonic: &QuadraticMap
 /// A map with a point in each hole, believed to be valid: [`crate::certify`] decides.
 #[derive(Clone, Debug)]
 pub struct Untangled {
-    /// The uv_of of all nodes of the filled chart.
+    /// The uv of all nodes of the filled chart.
     pub nodes: Vec<GridPoint>,
     /// Per hole, a point from which its loop can be seen.
     pub hole_centres: Vec<GridPoint>,
@@ -117,6 +117,35 @@ impl Stats {
 ///
 /// # Errors
 /// [`Interrupted`].
+///
+/// # Example
+///
+/// The energy of the result lies between that of the harmonic map, which folds, and that of the start.
+///
+/// ```
+/// use planish_core::map::boundary::{Boundary, Mids};
+/// use planish_core::map::filled::FilledChart;
+/// use planish_core::map::linear::{flatten_ear_arcs, linear_map};
+/// use planish_core::map::quadratic::quadratic_map;
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::untangle::{Dirichlet, untangle};
+/// use planish_core::{decompose, repair, shapes};
+///
+/// let mesh = repair(&shapes::bent_disk(12, 0.45, 1.0), &Default::default())?.mesh;
+/// let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()])?;
+/// let chart = FilledChart::new(&atlas.charts()[0]);
+/// // The boundary is chosen before all three maps, and is the same for all of them.
+/// let mut boundary = Boundary::circle(&chart, Mids::Arc);
+/// let linear = linear_map(&chart, &boundary, &NoMonitor)?;
+/// flatten_ear_arcs(&chart, &linear, &mut boundary);
+/// let start = linear.degree_elevated(&chart, &boundary);
+/// let harmonic = quadratic_map(&chart, &boundary, &NoMonitor)?;
+/// assert!(!harmonic.invalid().is_empty());
+/// let objective = Dirichlet::new(chart.shapes());
+/// let report = untangle(&chart, &objective, &start, &harmonic, &NoMonitor)?.report;
+/// assert!(report.energy_harmonic < report.energy && report.energy < report.energy_start);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn untangle<O: Objective>(
     chart: &FilledChart,
     objective: &O,
@@ -140,7 +169,8 @@ pub fn untangle<O: Objective>(
 
 /// The objective over all triangles, those of the fans included.
 fn total<O: Objective>(chart: &FilledChart, objective: &O, x: &[[f64; 2]]) -> f64 {
-    (0..chart.triangles().len()).map(|f| objective.value(FaceId::at(f), &chart.nodes(f).map(|n| x[n]))).sum()
+    let of_face = |f: usize| objective.value(FaceId::at(f), &chart.nodes(f).map(|n| x[n]));
+    (0..chart.triangles().len()).map(of_face).sum()
 }
 
 fn total_on_grid<O: Objective>(chart: &FilledChart, objective: &O, nodes: &[GridPoint]) -> f64 {
@@ -163,16 +193,19 @@ fn best<O: Objective>(
     stats: &mut Stats,
     checkpoint: &Checkpoint,
 ) -> Result<Found, Interrupted> {
-    let found = |method: Method, nodes: Vec<GridPoint>| {
-        valid(chart, &nodes).map(|hole_centres| Found { method, nodes, hole_centres })
+    // Each path is believed only as far as its result is valid on the grid.
+    let found_if_valid = |method: Method, nodes: Vec<GridPoint>| {
+        let hole_centres = valid(chart, &nodes)?;
+        Some(Found { method, nodes, hole_centres })
     };
-    if let Some(found) = found(Method::Harmonic, harmonic.nodes().to_vec()) {
+    if let Some(found) = found_if_valid(Method::Harmonic, harmonic.nodes().to_vec()) {
         return Ok(found);
     }
-    if harmonic.invalid().len() as f64 <= FEW * chart.chart_triangles() as f64 {
+    let are_few_invalid = harmonic.invalid().len() as f64 <= FEW * chart.chart_triangles() as f64;
+    if are_few_invalid {
         match patch::untangle(chart, objective, start, harmonic, stats, checkpoint) {
             Ok(nodes) => {
-                if let Some(found) = found(Method::Patch, nodes) {
+                if let Some(found) = found_if_valid(Method::Patch, nodes) {
                     return Ok(found);
                 }
             }
@@ -181,10 +214,11 @@ fn best<O: Objective>(
             Err(_) => {}
         }
     }
+    // Steps are counted over all paths, but accuracy is that of the path that is taken.
     stats.decrement = 0.0;
     match feasible::untangle(chart, objective, start, stats, checkpoint) {
         Ok(nodes) => {
-            if let Some(found) = found(Method::Feasible, nodes) {
+            if let Some(found) = found_if_valid(Method::Feasible, nodes) {
                 return Ok(found);
             }
         }
@@ -199,8 +233,9 @@ fn best<O: Objective>(
 
 /// If the map is valid and every hole can be seen from a point, these points.
 fn valid(chart: &FilledChart, nodes: &[GridPoint]) -> Option<Vec<GridPoint>> {
-    let centres: Option<Vec<_>> = (0..chart.loops().len()).map(|k| centre_of_hole(chart, nodes, k)).collect();
-    centres.filter(|_| invalid_triangles(chart, nodes).is_empty())
+    let holes = 0..chart.loops().len();
+    let centres = holes.map(|k| centre_of_hole(chart, nodes, k)).collect::<Option<Vec<_>>>()?;
+    invalid_triangles(chart, nodes).is_empty().then_some(centres)
 }
 
 /// A point from which all of the loop around hole `k` can be seen.

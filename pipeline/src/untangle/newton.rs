@@ -6,13 +6,14 @@ use super::problem::Problem;
 use crate::fem::sparse::{Analysis, Error};
 use crate::monitor::Interrupted;
 
-/// The share of the way to the nearest floor that one step may go.
+/// The share of the way to the nearest floor that one step may go. By experience: closer to 1 steps are longer, and end
+/// where the barrier is so steep that the next ones are short.
 const SAFE: f64 = 0.95;
 
 /// The share of the predicted decrease that a step must bring (Armijo).
 const DECREASE: f64 = 1e-4;
 
-/// How often a step is halved at most.
+/// How often a step is halved at most: to 1e-9 of it, where rounding hides what it brings.
 const HALVINGS: u32 = 30;
 
 /// When Newton's method ends.
@@ -55,11 +56,12 @@ pub(super) fn minimise<O: Objective>(
             break;
         }
         let direction = problem.direction(&step);
-        let from = matches!(penalty, Penalty::Barrier).then(|| x.to_vec());
+        // Only the barrier has dual variables, which follow each step from where it began.
+        let before = matches!(penalty, Penalty::Barrier).then(|| x.to_vec());
         let descent = Descent { direction: &direction, value, slope };
         let Some(lower) = search(problem, x, &descent, penalty)? else { break };
-        if let Some(from) = from {
-            problem.update_duals(&from, &direction, x);
+        if let Some(before) = before {
+            problem.update_duals(&before, &direction, x);
         }
         value = lower;
         outcome.iterations += 1;
@@ -95,11 +97,15 @@ fn search<O: Objective>(
             x[*n as usize] = [p[0] + t * d[0], p[1] + t * d[1]];
         }
         let reached = problem.value(x, penalty);
-        if reached <= descent.value + DECREASE * t * descent.slope && reached < descent.value {
+        // Where the promise is below rounding the first alone would take a step that brings nothing.
+        let brings_enough = reached <= descent.value + DECREASE * t * descent.slope;
+        if brings_enough && reached < descent.value {
             return Ok(Some(reached));
         }
         t *= 0.5;
     }
-    problem.free().iter().zip(start).for_each(|(n, p)| x[*n as usize] = p);
+    for (n, p) in problem.free().iter().zip(start) {
+        x[*n as usize] = p;
+    }
     Ok(None)
 }

@@ -16,8 +16,42 @@ pub struct LocalModel {
     pub hessian: [[f64; SCALARS]; SCALARS],
 }
 
-/// An objective: a sum over the triangles of a chart, each summand a smooth function, never negative, of the uv_of of
+/// An objective: a sum over the triangles of a chart, each summand a smooth function, never negative, of the uv of
 /// the triangle's six nodes. Newton's method and the barrier know nothing else of it.
+///
+/// # Example
+///
+/// The Dirichlet energy in which some triangles count more.
+///
+/// ```
+/// use planish_core::fem::element::{Element, P1, P2, P2Nodes};
+/// use planish_core::mesh::TriangleShape;
+/// use planish_core::topology::FaceId;
+/// use planish_core::untangle::{Dirichlet, LocalModel, Objective};
+///
+/// struct Weighted<'a>(Dirichlet<'a>, &'a [f64]);
+///
+/// impl Objective for Weighted<'_> {
+///     fn value(&self, face: FaceId, x: &P2Nodes) -> f64 {
+///         self.1[face.index()] * self.0.value(face, x)
+///     }
+///     fn model(&self, face: FaceId, x: &P2Nodes) -> LocalModel {
+///         let LocalModel { gradient, hessian } = self.0.model(face, x);
+///         let scaled = |v: f64| self.1[face.index()] * v;
+///         LocalModel { gradient: gradient.map(scaled), hessian: hessian.map(|row| row.map(scaled)) }
+///     }
+///     fn typical(&self, area: f64) -> f64 {
+///         self.0.typical(area)
+///     }
+/// }
+///
+/// // A triangle that is not stretched has its area as energy.
+/// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let nodes = P2::NODES.map(|l| P1::interpolate(&corners.map(|[x, y, _]| [x, y]), l));
+/// let shapes = [TriangleShape::of(corners)];
+/// let objective = Weighted(Dirichlet::new(&shapes), &[3.0]);
+/// assert!((objective.value(FaceId(0), &nodes) - 3.0 * 0.5).abs() < 1e-14);
+/// ```
 pub trait Objective {
     /// The summand of a triangle whose nodes lie at `x`.
     fn value(&self, face: FaceId, x: &P2Nodes) -> f64;
@@ -57,6 +91,7 @@ impl Objective for Dirichlet<'_> {
         let stiffness = self.stiffness(face);
         // Differences to the first node, so that small triangles lose no digits.
         let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
+        // The energy is quadratic: its gradient is the matrix times the values.
         let slope = |i: usize| (0..6).map(|n| stiffness[i / 2][n] * d[n][i % 2]).sum();
         let mut hessian = [[0.0; SCALARS]; SCALARS];
         for m in 0..6 {

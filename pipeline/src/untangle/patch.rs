@@ -96,21 +96,28 @@ pub(super) fn untangle<O: Objective>(
         if seeds.is_empty() {
             return Ok(nodes);
         }
-        let fallback = |k: usize| centres[k].unwrap_or(nodes[chart.centre_node(k)]);
+        // After all nodes the star centres, found anew: where there is none, the centre of the fan, to begin with.
         x.truncate(chart.node_count());
-        x.extend((0..centres.len()).map(|k| fallback(k).uv()));
+        for (k, centre) in centres.iter().enumerate() {
+            x.push(centre.unwrap_or(nodes[chart.centre_node(k)]).uv());
+        }
         let patches = region::patches(chart, &context.stars, &seeds, rings);
-        if patches.parts.iter().any(|p| p.len() as f64 > MAX_SHARE * chart.chart_triangles() as f64) {
+        let largest_allowed = MAX_SHARE * chart.chart_triangles() as f64;
+        if patches.parts.iter().any(|faces| faces.len() as f64 > largest_allowed) {
             return Err(Stuck::TooLarge);
         }
         for faces in &patches.parts {
             checkpoint.after(faces.len())?;
+            // How far a vertex begins towards the feasible start: all the way in the inner third of the rings, then
+            // less and less up to the rim.
             let weight = |v: usize| 1.5 * (1.0 - f64::from(patches.distance[v]) / rings as f64);
             match context.solve(faces, &x, weight, stats) {
-                Ok(moved) => moved.into_iter().for_each(|Moved { node, uv }| {
-                    x[node] = uv;
-                    nodes[node] = node_to_grid(chart, node, uv);
-                }),
+                Ok(moved) => {
+                    for Moved { node, uv } in moved {
+                        x[node] = uv;
+                        nodes[node] = node_to_grid(chart, node, uv);
+                    }
+                }
                 Err(Stuck::Interrupted(interrupted)) => return Err(interrupted.into()),
                 // Its triangles are seeds again, with more rings around them.
                 Err(_) => {}
@@ -124,10 +131,14 @@ pub(super) fn untangle<O: Objective>(
 /// The triangles that must change: invalid ones, and those at arcs of holes that no point can see.
 fn seeds(chart: &FilledChart, nodes: &[GridPoint], centres: &[Option<GridPoint>]) -> Vec<FaceId> {
     let mut seeds = invalid_triangles(chart, nodes);
-    for (k, hole) in chart.loops().iter().enumerate().filter(|(k, _)| centres[*k].is_none()) {
-        let hidden =
-            |h: &&HalfEdgeId| arc(chart, nodes, **h).products(nodes[chart.centre_node(k)]).iter().any(|p| *p >= 0);
-        seeds.extend(hole.iter().filter(hidden).map(|h| h.face()));
+    for (k, hole) in chart.loops().iter().enumerate() {
+        if centres[k].is_some() {
+            continue;
+        }
+        // Seen from the centre of its fan, for want of a better point.
+        let centre = nodes[chart.centre_node(k)];
+        let is_hidden = |h: HalfEdgeId| arc(chart, nodes, h).products(centre).iter().any(|p| *p >= 0);
+        seeds.extend(hole.iter().filter(|h| is_hidden(**h)).map(|h| h.face()));
     }
     seeds.sort_unstable();
     seeds.dedup();
@@ -151,17 +162,20 @@ struct PatchContext<'a, O> {
 impl<'a, O: Objective> PatchContext<'a, O> {
     fn new(chart: &'a FilledChart, objective: &'a O, start: &[GridPoint], checkpoint: &'a Checkpoint) -> Self {
         let stars = Stars::new(chart.triangles(), chart.vertex_count());
-        let in_plane = |f: usize| det(chart, start, f).coefficients().iter().sum::<f64>() / 6.0;
-        let plane: Vec<f64> = (0..chart.triangles().len()).map(in_plane).collect();
+        // The mean of a jacobian is the mean of its coefficients.
+        let mean_jacobian = |f: usize| det(chart, start, f).coefficients().iter().sum::<f64>() / 6.0;
+        let plane: Vec<f64> = (0..chart.triangles().len()).map(mean_jacobian).collect();
         let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
-        let density = |f: usize| {
-            let around = || chart.triangles()[f].iter().flat_map(|v| stars.around(v.index())).map(|g| *g as usize);
-            let scale = around().map(|g| plane[g]).sum::<f64>() / around().map(|g| space[g]).sum::<f64>();
-            scale * space[f]
-        };
-        let density = (0..plane.len()).map(density).collect();
+        let mut density = Vec::with_capacity(plane.len());
+        for (t, area) in chart.triangles().iter().zip(&space) {
+            let around = || t.iter().flat_map(|v| stars.around(v.index())).map(|g| *g as usize);
+            let in_plane = around().map(|g| plane[g]).sum::<f64>();
+            let in_space = around().map(|g| space[g]).sum::<f64>();
+            density.push(in_plane / in_space * area);
+        }
         let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
-        let (start, fixed) = (uv_of(start, &centres), chart.outer_nodes());
+        let start = uv_of(start, &centres);
+        let fixed = chart.outer_nodes();
         Self { chart, objective, stars, density, start, fixed, checkpoint }
     }
 
@@ -182,37 +196,55 @@ impl<'a, O: Objective> PatchContext<'a, O> {
         self.blend(&mut local, &problem, faces, weight);
         let mut spent = Stats::default();
         let relaxed = relax(&mut problem, &mut local, &mut spent);
+        // Steps count whether they led to anything or not; accuracy only where they did.
         stats.iterations += spent.iterations;
         relaxed?;
         let mut moved: Vec<Moved> = problem.moved(&local).collect();
         moved.sort_unstable_by_key(|m| m.node);
-        let place = |n: usize| moved.binary_search_by_key(&n, |m| m.node).map_or(x[n], |i| moved[i].uv);
-        let cell = |f: &FaceId| self.chart.nodes(f.index()).map(|n| node_to_grid(self.chart, n, place(n)));
-        let mut own = faces.iter().filter(|f| f.index() < self.chart.chart_triangles());
-        if !own.all(|f| JacobianBezier::new(cell(f)).validity() != Validity::Invalid) {
+        if !self.is_valid(faces, x, &moved) {
             return Err(Stuck::Invalid);
         }
         stats.decrement = stats.decrement.max(spent.decrement);
         Ok(moved)
     }
 
+    /// Whether a patch of the map `x` is valid on the grid once the nodes `moved` (ascending) are where they are now.
+    fn is_valid(&self, faces: &[FaceId], x: &[[f64; 2]], moved: &[Moved]) -> bool {
+        let uv = |n: usize| moved.binary_search_by_key(&n, |m| m.node).map_or(x[n], |i| moved[i].uv);
+        for f in faces {
+            if f.index() >= self.chart.chart_triangles() {
+                continue;
+            }
+            let nodes = self.chart.nodes(f.index()).map(|n| node_to_grid(self.chart, n, uv(n)));
+            if JacobianBezier::new(nodes).validity() == Validity::Invalid {
+                return false;
+            }
+        }
+        true
+    }
+
     /// Moves free nodes towards the feasible start, by a share that `weight` gives for each vertex (cut to 0 and 1)
     /// and that mid-edge nodes take from both ends.
     fn blend(&self, x: &mut [[f64; 2]], problem: &Problem<O>, faces: &[FaceId], weight: impl Fn(usize) -> f64) {
-        let own = self.chart.chart_vertices();
-        let share = |v: VertexId| if v.index() < own { weight(v.index()).clamp(0.0, 1.0) } else { 0.0 };
+        // Centres of fans stay as they are.
+        let is_of_chart = |v: VertexId| v.index() < self.chart.chart_vertices();
+        let share = |v: VertexId| if is_of_chart(v) { weight(v.index()).clamp(0.0, 1.0) } else { 0.0 };
+        // Per node its share; nodes that triangles have in common come several times, with the same one.
         let mut shares: Vec<(usize, f64)> = Vec::with_capacity(6 * faces.len());
         for f in faces {
             let nodes = self.chart.nodes(f.index());
             let corner = self.chart.triangles()[f.index()].map(share);
-            shares.extend((0..3).map(|k| (nodes[k], corner[k])));
-            shares.extend((0..3).map(|k| (nodes[3 + k], 0.5 * (corner[k] + corner[(k + 1) % 3]))));
+            for k in 0..3 {
+                shares.push((nodes[k], corner[k]));
+                shares.push((nodes[3 + k], 0.5 * (corner[k] + corner[(k + 1) % 3])));
+            }
         }
         shares.sort_unstable_by_key(|s| s.0);
         for local in problem.free() {
             let n = problem.nodes()[*local as usize] as usize;
             let found = shares.binary_search_by_key(&n, |s| s.0);
-            let (share, to) = (found.map_or(0.0, |i| shares[i].1), self.start[n]);
+            let share = found.map_or(0.0, |i| shares[i].1);
+            let to = self.start[n];
             let p = &mut x[*local as usize];
             *p = [0, 1].map(|k| p[k] + share * (to[k] - p[k]));
         }
@@ -220,21 +252,26 @@ impl<'a, O: Objective> PatchContext<'a, O> {
 
     /// The problem on a patch: penalties on its triangles and on the arcs of holes in it.
     fn problem(&self, faces: &[FaceId]) -> Problem<'a, O> {
-        let own = |f: FaceId| f.index() < self.chart.chart_triangles();
-        let bound = |f: FaceId| {
-            let density = self.density[f.index()];
-            Bound { scale: density, floor: 0.0, weight: self.objective.typical(density), dual: None }
-        };
-        let cells = faces.iter().map(|f| Cell { face: *f, bounds: own(*f).then(|| [bound(*f); 6]) }).collect();
-        let mean =
-            faces.iter().map(|f| self.objective.typical(self.density[f.index()])).sum::<f64>() / faces.len() as f64;
-        let unset = Bound { scale: 1.0, floor: 0.0, weight: mean, dual: None };
-        let mut arcs = region::arc_cells(self.chart, |h| faces.binary_search(&h.face()).is_ok(), unset);
-        let free = region::free_nodes(self.chart, &self.stars, &self.fixed, faces);
-        for arc in &mut arcs {
-            let scale = arcs::products(&arc.nodes.map(|n| self.start[n as usize]));
-            (0..3).for_each(|k| arc.bounds[k].scale = scale[k]);
+        let weight = |f: FaceId| self.objective.typical(self.density[f.index()]);
+        let mut cells = Vec::with_capacity(faces.len());
+        for &face in faces {
+            let bound = Bound { scale: self.density[face.index()], floor: 0.0, weight: weight(face), dual: None };
+            // Fans have energy, and may fold.
+            let is_of_chart = face.index() < self.chart.chart_triangles();
+            cells.push(Cell { face, bounds: is_of_chart.then_some([bound; 6]) });
         }
+        let mean = faces.iter().map(|f| weight(*f)).sum::<f64>() / faces.len() as f64;
+        let unset = Bound { scale: 1.0, floor: 0.0, weight: mean, dual: None };
+        let is_in_patch = |h: HalfEdgeId| faces.binary_search(&h.face()).is_ok();
+        let mut arcs = region::arc_cells(self.chart, is_in_patch, unset);
+        for arc in &mut arcs {
+            // What is typical of an arc is what the feasible start has there.
+            let scales = arcs::products(&arc.nodes.map(|n| self.start[n as usize]));
+            for (bound, scale) in arc.bounds.iter_mut().zip(scales) {
+                bound.scale = scale;
+            }
+        }
+        let free = region::free_nodes(self.chart, &self.stars, &self.fixed, faces);
         Problem::new(self.chart, self.objective, cells, arcs, &free, self.checkpoint)
     }
 }

@@ -72,13 +72,17 @@ impl<'a, O: Objective> Problem<'a, O> {
         free: &[u32],
         checkpoint: &'a Checkpoint,
     ) -> Self {
-        let of_chart = |cell: &Cell| chart.nodes(cell.face.index()).map(|n| n as u32);
-        let mut nodes: Vec<u32> = cells.iter().flat_map(of_chart).chain(arcs.iter().flat_map(|a| a.nodes)).collect();
+        let in_chart = |cell: &Cell| chart.nodes(cell.face.index()).map(|n| n as u32);
+        let of_arcs = arcs.iter().flat_map(|a| a.nodes);
+        let mut nodes: Vec<u32> = cells.iter().flat_map(in_chart).chain(of_arcs).collect();
         nodes.sort_unstable();
         nodes.dedup();
+        // From the numbering of the chart to that of the region: the place among all nodes of the region.
         let local = |n: u32| nodes.partition_point(|m| *m < n) as u32;
-        let of_cell = cells.iter().map(|c| of_chart(c).map(local)).collect();
-        arcs.iter_mut().for_each(|a| a.nodes = a.nodes.map(local));
+        let of_cell = cells.iter().map(|c| in_chart(c).map(local)).collect();
+        for arc in &mut arcs {
+            arc.nodes = arc.nodes.map(local);
+        }
         let dofs = Dofs::new(nodes.len(), free.iter().map(|n| local(*n)).collect());
         Self { chart, objective, checkpoint, cells, arcs, nodes, of_cell, dofs }
     }
@@ -160,6 +164,7 @@ impl<'a, O: Objective> Problem<'a, O> {
                 let dets = corners.dets();
                 let values: [Value; 6] = std::array::from_fn(|k| penalty.at(dets[k], &bounds[k]));
                 let shape = &self.chart.shapes()[cell.face.index()];
+                // Two parts: the curvature of the coefficients, and that of the penalty along their gradients.
                 add_curvature(&mut local.hessian, shape, &values.map(|v| v.multiplier));
                 for (k, value) in values.iter().enumerate() {
                     add_outer(&mut local, value, &corners.gradient(k));
@@ -172,6 +177,7 @@ impl<'a, O: Objective> Problem<'a, O> {
             let uv = arc_uv(arc, x);
             let products = arcs::products(&uv);
             let mut local = LocalModel { gradient: [0.0; SCALARS], hessian: [[0.0; SCALARS]; SCALARS] };
+            // The curvature of the products themselves is left out.
             for k in 0..3 {
                 let value = penalty.at(products[k], &arc.bounds[k]);
                 add_outer(&mut local, &value, &padded(arcs::gradient(&uv, k)));
@@ -202,19 +208,24 @@ impl<'a, O: Objective> Problem<'a, O> {
 
     /// The largest t at which no penalised quantity of `x + t direction` has fallen to its floor yet.
     pub fn longest_step(&self, x: &[[f64; 2]], direction: &[[f64; 2]]) -> f64 {
+        // Every penalised quantity is quadratic in the nodes, and so is it along a line: c0 + c1 t + c2 t^2.
         let mut longest = f64::INFINITY;
-        let mut meet = |c0: f64, c1: f64, c2: f64| longest = longest.min(first_zero(c0, c1, c2));
         for (i, cell) in self.cells.iter().enumerate() {
             let Some(bounds) = &cell.bounds else { continue };
-            let (at, along) =
-                (CornerDerivatives::new(&self.cell_uv(i, x)), CornerDerivatives::new(&self.cell_uv(i, direction)));
+            let at = CornerDerivatives::new(&self.cell_uv(i, x));
+            let along = CornerDerivatives::new(&self.cell_uv(i, direction));
             let (c0, c1, c2) = (at.dets(), at.polarization(&along), along.dets());
-            (0..6).for_each(|k| meet(c0[k] - bounds[k].floor, c1[k], c2[k]));
+            for k in 0..6 {
+                longest = longest.min(first_zero(c0[k] - bounds[k].floor, c1[k], c2[k]));
+            }
         }
         for arc in &self.arcs {
-            let (at, along) = (arc_uv(arc, x), arc_uv(arc, direction));
+            let at = arc_uv(arc, x);
+            let along = arc_uv(arc, direction);
             let (c0, c1, c2) = (arcs::products(&at), arcs::polarization(&at, &along), arcs::products(&along));
-            (0..3).for_each(|k| meet(c0[k] - arc.bounds[k].floor, c1[k], c2[k]));
+            for k in 0..3 {
+                longest = longest.min(first_zero(c0[k] - arc.bounds[k].floor, c1[k], c2[k]));
+            }
         }
         longest
     }
@@ -223,13 +234,15 @@ impl<'a, O: Objective> Problem<'a, O> {
     pub fn for_each_bound(&mut self, x: &[[f64; 2]], mut visit: impl FnMut(f64, &mut Bound)) {
         for i in 0..self.cells.len() {
             let dets = CornerDerivatives::new(&self.cell_uv(i, x)).dets();
-            if let Some(bounds) = &mut self.cells[i].bounds {
-                (0..6).for_each(|k| visit(dets[k], &mut bounds[k]));
+            for (det, bound) in dets.iter().zip(self.cells[i].bounds.iter_mut().flatten()) {
+                visit(*det, bound);
             }
         }
         for arc in &mut self.arcs {
             let products = arcs::products(&arc_uv(arc, x));
-            (0..3).for_each(|k| visit(products[k], &mut arc.bounds[k]));
+            for (product, bound) in products.iter().zip(&mut arc.bounds) {
+                visit(*product, bound);
+            }
         }
     }
 
@@ -241,14 +254,17 @@ impl<'a, O: Objective> Problem<'a, O> {
                 continue;
             }
             let [x, d, y] = [from, direction, to].map(|p| CornerDerivatives::new(&self.cell_uv(i, p)));
-            let (c, change, new) = (x.dets(), x.polarization(&d), y.dets());
-            let bounds = self.cells[i].bounds.iter_mut().flatten();
-            bounds.enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));
+            let (old, change, new) = (x.dets(), x.polarization(&d), y.dets());
+            for (k, bound) in self.cells[i].bounds.iter_mut().flatten().enumerate() {
+                bound.update_dual(old[k], change[k], new[k]);
+            }
         }
         for arc in &mut self.arcs {
             let [x, d, y] = [from, direction, to].map(|p| arc_uv(arc, p));
-            let (c, change, new) = (arcs::products(&x), arcs::polarization(&x, &d), arcs::products(&y));
-            arc.bounds.iter_mut().enumerate().for_each(|(k, b)| b.update_dual(c[k], change[k], new[k]));
+            let (old, change, new) = (arcs::products(&x), arcs::polarization(&x, &d), arcs::products(&y));
+            for (k, bound) in arc.bounds.iter_mut().enumerate() {
+                bound.update_dual(old[k], change[k], new[k]);
+            }
         }
     }
 
@@ -261,8 +277,11 @@ impl<'a, O: Objective> Problem<'a, O> {
 
     /// Scales the weights of all penalties.
     pub fn scale_weights(&mut self, factor: f64) {
-        let bounds = self.cells.iter_mut().filter_map(|c| c.bounds.as_mut()).flatten();
-        bounds.chain(self.arcs.iter_mut().flat_map(|a| &mut a.bounds)).for_each(|b| b.weight *= factor);
+        let of_cells = self.cells.iter_mut().filter_map(|c| c.bounds.as_mut()).flatten();
+        let of_arcs = self.arcs.iter_mut().flat_map(|a| &mut a.bounds);
+        for bound in of_cells.chain(of_arcs) {
+            bound.weight *= factor;
+        }
     }
 
     /// Newton's step: minus the inverse Hessian times the gradient. Where rounding makes the Hessian singular its
@@ -316,6 +335,7 @@ fn first_zero(c0: f64, c1: f64, c2: f64) -> f64 {
     // The form of the root that does not cancel where c1 < 0.
     let root = discriminant.max(0.0).sqrt();
     let t = if c1 <= 0.0 { 2.0 * c0 / (root - c1) } else { -(c1 + root) / (2.0 * c2) };
+    // Negative where c2 = 0 < c1: what only grows never falls to zero.
     if t > 0.0 { t } else { f64::INFINITY }
 }
 

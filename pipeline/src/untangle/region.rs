@@ -17,20 +17,28 @@ pub(super) struct Patches {
 /// The triangles within `rings` rings of the seeds. Rings grow through vertices of the chart, not through the
 /// centres of fans.
 pub(super) fn patches(chart: &FilledChart, stars: &Stars, seeds: &[FaceId], rings: usize) -> Patches {
-    let mut inside = vec![false; chart.triangles().len()];
-    let mut distance = vec![rings as u32; chart.chart_vertices()];
+    let rings = rings as u32;
+    let is_of_chart = |v: &VertexId| v.index() < chart.chart_vertices();
+    let mut is_inside = vec![false; chart.triangles().len()];
+    for f in seeds {
+        is_inside[f.index()] = true;
+    }
+    // So it stays where no ring comes: at the rim and beyond.
+    let mut distance = vec![rings; chart.chart_vertices()];
     let mut front: Vec<FaceId> = seeds.to_vec();
-    seeds.iter().for_each(|f| inside[f.index()] = true);
     let mut all = front.clone();
-    let own = chart.chart_vertices();
-    for ring in 0..rings as u32 {
+    for ring in 0..rings {
         let mut next = Vec::new();
-        let vertices = front.iter().flat_map(|f| chart.triangles()[f.index()]).filter(|v| v.index() < own);
-        for v in vertices {
-            if distance[v.index()] == rings as u32 {
-                distance[v.index()] = ring;
-                let new = faces_around(stars, v).filter(|f| !std::mem::replace(&mut inside[f.index()], true));
-                next.extend(new);
+        for v in front.iter().flat_map(|f| chart.triangles()[f.index()]).filter(is_of_chart) {
+            if distance[v.index()] < rings {
+                continue;
+            }
+            distance[v.index()] = ring;
+            for f in faces_around(stars, v) {
+                if !is_inside[f.index()] {
+                    is_inside[f.index()] = true;
+                    next.push(f);
+                }
             }
         }
         all.extend(&next);
@@ -54,30 +62,33 @@ fn components(chart: &FilledChart, faces: Vec<FaceId>) -> Vec<Vec<FaceId>> {
         sets.merge(a, b);
         sets.merge(b, c);
     }
-    let mut keyed: Vec<(usize, FaceId)> =
-        faces.iter().map(|f| (sets.find(chart.triangles()[f.index()][0].index()), *f)).collect();
+    let mut part_of = |f: FaceId| sets.find(chart.triangles()[f.index()][0].index());
+    let mut keyed: Vec<(usize, FaceId)> = faces.iter().map(|f| (part_of(*f), *f)).collect();
     keyed.sort_unstable();
-    keyed.chunk_by(|a, b| a.0 == b.0).map(|part| part.iter().map(|k| k.1).collect()).collect()
+    let parts = keyed.chunk_by(|a, b| a.0 == b.0);
+    parts.map(|part| part.iter().map(|(_, face)| *face).collect()).collect()
 }
 
 /// The nodes that may move when only `faces` (ascending) may change: all of their triangles are among them, and
 /// they are not `fixed`.
 pub(super) fn free_nodes(chart: &FilledChart, stars: &Stars, fixed: &[bool], faces: &[FaceId]) -> Vec<u32> {
-    let among = |f: FaceId| faces.binary_search(&f).is_ok();
+    let is_among = |f: FaceId| faces.binary_search(&f).is_ok();
     let mut free = Vec::new();
     for &f in faces {
         let nodes = chart.nodes(f.index());
         for (k, v) in chart.triangles()[f.index()].iter().enumerate() {
+            let (at_vertex, at_middle) = (nodes[k], nodes[3 + k]);
             let h = HalfEdgeId::side_of(f, k);
             let sides = chart.edges().sides(chart.edges().edge(h));
-            if !fixed[nodes[3 + k]] && sides.iter().all(|s| among(s.face())) {
-                free.push(nodes[3 + k] as u32);
+            if !fixed[at_middle] && sides.iter().all(|s| is_among(s.face())) {
+                free.push(at_middle as u32);
             }
-            if !fixed[nodes[k]] && faces_around(stars, *v).all(among) {
-                free.push(nodes[k] as u32);
+            if !fixed[at_vertex] && faces_around(stars, *v).all(is_among) {
+                free.push(at_vertex as u32);
             }
         }
     }
+    // Triangles share their nodes.
     free.sort_unstable();
     free.dedup();
     free
@@ -85,15 +96,15 @@ pub(super) fn free_nodes(chart: &FilledChart, stars: &Stars, fixed: &[bool], fac
 
 /// The arcs of all holes whose half-edges `wanted` picks, with their star centres, all with the bound `unset`.
 pub(super) fn arc_cells(chart: &FilledChart, wanted: impl Fn(HalfEdgeId) -> bool, unset: Bound) -> Vec<ArcCell> {
-    let cell = |k: usize, h: HalfEdgeId| {
-        let [from, to] = chart.ends(h).map(|v| chart.vertex_node(v) as u32);
+    let mut cells = Vec::new();
+    for (k, hole) in chart.loops().iter().enumerate() {
+        // Star centres are numbered after all nodes of the chart.
         let centre = (chart.node_count() + k) as u32;
-        ArcCell { nodes: [from, chart.mid_node(h) as u32, to, centre], bounds: [unset; 3] }
-    };
-    let holes = chart.loops().iter().enumerate();
-    holes
-        .flat_map(|(k, l)| l.iter().map(move |h| (k, *h)))
-        .filter(|(_, h)| wanted(*h))
-        .map(|(k, h)| cell(k, h))
-        .collect()
+        for h in hole.iter().copied().filter(|h| wanted(*h)) {
+            let [from, to] = chart.ends(h).map(|v| chart.vertex_node(v) as u32);
+            let nodes = [from, chart.mid_node(h) as u32, to, centre];
+            cells.push(ArcCell { nodes, bounds: [unset; 3] });
+        }
+    }
+    cells
 }

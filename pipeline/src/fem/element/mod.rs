@@ -80,9 +80,25 @@ pub trait Element<const N: usize> {
 
 /// The Dirichlet energy 1/2 int |grad u|^2 + |grad v|^2 over a triangle with this stiffness matrix and these nodal
 /// values (u, v). Works on differences to the first node, so that small triangles lose no digits.
+///
+/// # Example
+///
+/// The energy has no unit of length: it is the area of the image where the map is conformal, and more elsewhere.
+///
+/// ```
+/// use planish_core::fem::element::{Element, P1, energy};
+/// use planish_core::mesh::TriangleShape;
+///
+/// let k = P1::stiffness(&TriangleShape::of([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]));
+/// let onto = |height: f64| energy(&k, &[[0.0, 0.0], [1.0, 0.0], [0.0, height]]);
+/// assert!((onto(1.0) - 0.5).abs() < 1e-15, "a quarter as large in both directions");
+/// assert!((onto(3.0) - 2.5).abs() < 1e-15, "its area is 1.5");
+/// ```
 pub fn energy<const N: usize>(stiffness: &[[f64; N]; N], x: &[[f64; 2]; N]) -> f64 {
     let d = x.map(|p| [p[0] - x[0][0], p[1] - x[0][1]]);
-    let row = |i: usize| (0..N).map(|j| stiffness[i][j] * (d[i][0] * d[j][0] + d[i][1] * d[j][1])).sum::<f64>();
+    let product = |i: usize, j: usize| d[i][0] * d[j][0] + d[i][1] * d[j][1];
+    // The first row has no part in it: the difference there is zero.
+    let row = |i: usize| (0..N).map(|j| stiffness[i][j] * product(i, j)).sum::<f64>();
     0.5 * (1..N).map(row).sum::<f64>()
 }
 

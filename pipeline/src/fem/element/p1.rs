@@ -4,6 +4,22 @@ use super::{Barycentric, Element};
 use crate::mesh::TriangleShape;
 
 /// The linear triangle with 3 nodes.
+///
+/// # Example
+///
+/// The entry of an edge is minus half the cotangent of the angle opposite: none for a right one.
+///
+/// ```
+/// use planish_core::fem::element::{Element, P1};
+/// use planish_core::mesh::TriangleShape;
+///
+/// // The right angle is at node 0, opposite the edge from node 1 to node 2.
+/// let shape = TriangleShape::of([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+/// let k = P1::stiffness(&shape);
+/// assert!(k[1][2].abs() < 1e-15 && (k[0][1] + 0.5).abs() < 1e-15);
+/// // Constants have no energy: rows sum to zero.
+/// assert!(k.iter().all(|row| row.iter().sum::<f64>().abs() < 1e-15));
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct P1;
 

@@ -7,6 +7,18 @@ use crate::mesh::TriangleShape;
 pub type P2Nodes = [[f64; 2]; 6];
 
 /// The quadratic triangle with 6 nodes.
+///
+/// # Example
+///
+/// Basis functions of vertices are negative in the middle. So the values of a quadratic function are no means of its
+/// nodal values, and harmonic maps by this element may leave the disk, and fold.
+///
+/// ```
+/// use planish_core::fem::element::{Element, P2};
+///
+/// let [at_vertex, .., at_edge] = P2::basis([1.0 / 3.0; 3]);
+/// assert!((at_vertex + 1.0 / 9.0).abs() < 1e-15 && (at_edge - 4.0 / 9.0).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct P2;
 
@@ -45,14 +57,19 @@ impl Element<6> for P2 {
             // Vertex i lies on edges e and e + 2.
             k[i][i] = c[e] + c[(e + 2) % 3];
             k[mid][mid] = 8.0 / 3.0 * total;
-            let others = 3 + (e + 1) % 3;
-            let entries = [(i, j, c[e] / 3.0), (i, mid, -4.0 / 3.0 * c[e]), (j, mid, -4.0 / 3.0 * c[e])];
             // Edges e and e + 1 meet at vertex j; the edge between their other ends is e + 2.
-            for (a, b, value) in entries.into_iter().chain([(mid, others, -8.0 / 3.0 * c[(e + 2) % 3])]) {
-                k[a][b] = value;
-                k[b][a] = value;
-            }
+            let next_mid = 3 + (e + 1) % 3;
+            set_both(&mut k, i, j, c[e] / 3.0);
+            set_both(&mut k, i, mid, -4.0 / 3.0 * c[e]);
+            set_both(&mut k, j, mid, -4.0 / 3.0 * c[e]);
+            set_both(&mut k, mid, next_mid, -8.0 / 3.0 * c[(e + 2) % 3]);
         }
         k
     }
+}
+
+/// Sets an entry of a symmetric matrix, and its mirror image.
+fn set_both(k: &mut [[f64; 6]; 6], row: usize, column: usize, value: f64) {
+    k[row][column] = value;
+    k[column][row] = value;
 }

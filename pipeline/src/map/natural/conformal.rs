@@ -17,6 +17,26 @@ use crate::monitor::Monitor;
 ///
 /// # Errors
 /// The system cannot be solved, or interrupted.
+///
+/// # Example
+///
+/// A quarter of a tube is flat when it is unrolled: nothing is stretched.
+///
+/// ```
+/// use planish_core::map::natural::conformal;
+/// use planish_core::mesh::TriangleSoup;
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{decompose, repair, shapes};
+///
+/// let tube = shapes::tube(24, 4, 1.0);
+/// let quarter = tube.triangles().iter().filter(|t| t.iter().all(|v| v % 24 <= 6)).copied().collect();
+/// let mesh = repair(&TriangleSoup::new(tube.points().to_vec(), quarter)?, &Default::default())?.mesh;
+/// let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()])?;
+/// let unrolled = conformal(&atlas.charts()[0], &NoMonitor)?.expect("one-to-one");
+/// assert!((unrolled.distortion.conformal_p99 - 1.0).abs() < 1e-6);
+/// assert!((unrolled.distortion.area_ratio - 1.0).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Option<Natural>, sparse::Error> {
     let held = far_apart(chart);
     let nodes = chart.vertices().len() + chart.edges().len();
@@ -58,11 +78,16 @@ fn similar(cell: [u32; 6]) -> [[usize; 3]; 4] {
 fn far_apart(chart: &Chart) -> [usize; 2] {
     let lengths: Vec<f64> = chart.outer().iter().map(|h| chart.length(*h)).collect();
     let mut left = 0.5 * lengths.iter().sum::<f64>();
-    let opposite = lengths.iter().position(|l| {
-        left -= l;
-        left <= 0.0
-    });
-    let opposite = opposite.unwrap_or(0).max(1);
+    let mut opposite = 0;
+    for (i, length) in lengths.iter().enumerate() {
+        left -= length;
+        if left <= 0.0 {
+            opposite = i;
+            break;
+        }
+    }
+    // Two vertices, even where one edge is half of the loop or more.
+    let opposite = opposite.max(1);
     [0, opposite].map(|i| chart.from(chart.outer()[i]).index())
 }
 

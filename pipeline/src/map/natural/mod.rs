@@ -27,7 +27,8 @@ pub use projection::projection;
 /// Maps are scaled into a disk of this radius: well within what the grid holds exactly.
 const RADIUS: f64 = 0.984375;
 
-/// A map with a boundary of its own that is proven to be one-to-one.
+/// A map with a boundary of its own that is proven to be one-to-one. What comes out of [`projection()`], [`conformal()`]
+/// and [`natural`].
 #[derive(Clone, Debug)]
 pub struct Natural {
     /// The map.
@@ -37,10 +38,12 @@ pub struct Natural {
 }
 
 /// Charts are projected where a hundredth of their area at most is steeper than this, as the length along a slope over
-/// that of its projection (76 degrees).
+/// that of its projection (76 degrees). By experience: smaller leaves more charts on the disk, larger lets projections
+/// shrink steep parts further.
 const STEEP: f64 = 4.0;
 
-/// From this conformal distortion on a chart is unrolled, if it can be. It takes as long as a map.
+/// From this conformal distortion on a chart is unrolled, if it can be. It takes as long as a map. By experience:
+/// smaller takes that time for more charts, larger leaves more of them stretched.
 const UNEVEN: f64 = 5.0;
 
 /// Charts with more triangles are not unrolled: a system as large would need memory that nobody gave to the hand-off.
@@ -55,8 +58,27 @@ const EVEN: f64 = 100.0;
 ///
 /// # Errors
 /// [`Interrupted`].
+///
+/// # Example
+///
+/// A plate with holes is stretched by a disk, and not at all by its own plane.
+///
+/// ```
+/// use planish_core::map::natural::natural;
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{Settings, parametrize, shapes};
+///
+/// let plate = parametrize(&shapes::disk_with_holes(13, 2), &Settings::default(), &NoMonitor)?;
+/// let on_disk = plate.charts()[0].distortion().conformal_p99;
+/// let own = natural(plate.charts()[0].chart(), on_disk, &NoMonitor)?.expect("it is nearly flat");
+/// assert!(own.distortion.conformal_p99 < on_disk);
+/// // What the disk does not stretch either is left on it.
+/// assert!(natural(plate.charts()[0].chart(), 1.0, &NoMonitor)?.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn natural(chart: &Chart, on_disk: f64, monitor: &dyn Monitor) -> Result<Option<Natural>, Interrupted> {
     let is_even = |n: &Natural| n.distortion.area_ratio < EVEN;
+    // The projection first: it takes no system, and the shape of the boundary is kept as it is.
     if let Some(projected) = projection(chart, on_disk.min(STEEP)).filter(is_even) {
         return Ok(Some(projected));
     }
@@ -84,13 +106,22 @@ fn certified(chart: &Chart, uv: &[[f64; 2]]) -> Option<Natural> {
 
 /// Places moved and scaled into a disk of [`RADIUS`] around the origin; none where they all are one, or not finite.
 fn fitted(uv: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-    let bound = |k: usize, f: fn(f64, f64) -> f64, start| uv.iter().map(|p| p[k]).fold(start, f);
-    let min = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
-    let max = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
-    let half = 0.5 * (max[0] - min[0]).hypot(max[1] - min[1]);
-    let scale = RADIUS / half;
+    let mut min = [f64::INFINITY; 2];
+    let mut max = [f64::NEG_INFINITY; 2];
+    for p in uv {
+        for k in 0..2 {
+            min[k] = min[k].min(p[k]);
+            max[k] = max[k].max(p[k]);
+        }
+    }
+    let half_diagonal = 0.5 * (max[0] - min[0]).hypot(max[1] - min[1]);
+    // Infinite where all places are one, zero where one of them is infinite.
+    let scale = RADIUS / half_diagonal;
+    if !scale.is_finite() || scale <= 0.0 {
+        return None;
+    }
     let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (min[k] + max[k])) * scale);
-    (scale.is_finite() && scale > 0.0).then(|| uv.iter().map(moved).collect())
+    Some(uv.iter().map(moved).collect())
 }
 
 /// How much the parts of a chart's triangles are stretched. The area ratio is that of parts, not of stars.
@@ -99,18 +130,21 @@ fn summary(chart: &Chart, map: &PlanarMap) -> Summary {
     for (shape, cell) in chart.shapes().iter().zip(&map.cells) {
         let uv = cell.map(|n| map.nodes[n as usize].uv());
         let [a, b, c] = shape.in_plane();
-        let middle = |p: [f64; 2], q: [f64; 2]| [0, 1].map(|k| 0.5 * (p[k] + q[k]));
         let flat = [a, b, c, middle(a, b), middle(b, c), middle(c, a)];
-        let area = 0.25 * shape.area();
+        let area_of_part = 0.25 * shape.area();
         for (from, to) in parts(flat).into_iter().zip(parts(uv)) {
             let stretch = Stretch::between(from, to);
-            conformal.push(Weighted { value: stretch.conformal, weight: area });
-            scales.push(Weighted { value: stretch.area, weight: area });
+            conformal.push(Weighted { value: stretch.conformal, weight: area_of_part });
+            scales.push(Weighted { value: stretch.area, weight: area_of_part });
         }
     }
     let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
     let [min, max] = quantiles(&mut scales, [0.001, 0.999]);
     Summary { conformal_median, conformal_p99, area_ratio: (max / min).clamp(1.0, f64::MAX) }
+}
+
+fn middle(p: [f64; 2], q: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|k| 0.5 * (p[k] + q[k]))
 }
 
 /// How the linear map from one triangle of the plane to another stretches.
@@ -123,16 +157,25 @@ struct Stretch {
 
 impl Stretch {
     fn between(from: [[f64; 2]; 3], to: [[f64; 2]; 3]) -> Self {
-        let sides = |t: [[f64; 2]; 3]| [1, 2].map(|i| [t[i][0] - t[0][0], t[i][1] - t[0][1]]);
-        let ([p, q], [u, v]) = (sides(from), sides(to));
-        let doubled = p[0] * q[1] - p[1] * q[0];
-        // The columns of the matrix.
-        let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled);
-        let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled);
+        let [p, q] = sides_at_first(from);
+        let [u, v] = sides_at_first(to);
+        let doubled_area = p[0] * q[1] - p[1] * q[0];
+        // The columns of the matrix that carries p to u and q to v.
+        let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled_area);
+        let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled_area);
         let det = x[0] * y[1] - x[1] * y[0];
-        let bounded = |x: f64| if x.is_finite() && x > 0.0 { x } else { f64::MAX };
         Self { conformal: bounded(singular_ratio(x, y, det)).max(1.0), area: bounded(det) }
     }
+}
+
+/// The sides of a triangle from its first corner.
+fn sides_at_first([a, b, c]: [[f64; 2]; 3]) -> [[f64; 2]; 2] {
+    [b, c].map(|p| [p[0] - a[0], p[1] - a[1]])
+}
+
+/// A quantity that is finite and positive but for rounding; the largest double where it is not.
+fn bounded(x: f64) -> f64 {
+    if x.is_finite() && x > 0.0 { x } else { f64::MAX }
 }
 
 #[cfg(test)]
