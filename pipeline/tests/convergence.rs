@@ -131,7 +131,7 @@ fn errors_on_hemisphere(rings: u32) -> [f64; 2] {
         for f in faces.clone() {
             let (x, uv) = (geometry(f), chart.nodes(f).map(|n| found[n]));
             Rule::of_degree(6).for_each(|l, weight| {
-                let area = 0.5 * FirstForm::of_nodes::<P2, 6>(&x, l).area_element();
+                let area = 0.5 * FirstForm::of_nodes::<P2, 6>(&x, l).area_element;
                 let (got, wanted) = (P2::interpolate(&uv, l), stereographic(P2::interpolate(&x, l)));
                 square += weight * area * ((got[0] - wanted[0]).powi(2) + (got[1] - wanted[1]).powi(2));
             });

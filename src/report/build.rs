@@ -174,10 +174,10 @@ fn untangling(report: &untangle::Report, det_min: f64) -> Untangle {
         method: method.to_owned(),
         iterations: report.iterations,
         nodes_moved: report.nodes_moved,
-        energy_harmonic: report.energy_harmonic,
+        energy_harmonic: report.energy_unconstrained,
         energy_start: report.energy_start,
         energy: report.energy,
-        energy_excess: (report.energy - report.energy_harmonic) / report.energy_harmonic,
+        energy_excess: (report.energy - report.energy_unconstrained) / report.energy_unconstrained,
         gradient_norm: report.gradient_norm,
         det_min,
     }

@@ -27,6 +27,18 @@ pub struct QuadraticMap {
 }
 
 impl QuadraticMap {
+    /// A quadratic map that was found otherwise: the `uv` of all nodes of the filled chart, and the `energy` that it has by
+    /// whatever it minimises.
+    ///
+    /// # Panics
+    /// If there are not as many uv as nodes.
+    pub fn of(chart: &FilledChart, uv: Vec<[f64; 2]>, energy: f64) -> Self {
+        assert_eq!(uv.len(), chart.node_count(), "the uv of every node");
+        let nodes = to_grid(chart, &uv);
+        let invalid = invalid_triangles(chart, &nodes);
+        Self { uv, nodes, invalid, energy }
+    }
+
     /// The uv of all nodes of the filled chart, as they were solved for. They may lie far outside the disk: there
     /// is no maximum principle for quadratic elements.
     pub fn uv(&self) -> &[[f64; 2]] {
@@ -43,7 +55,7 @@ impl QuadraticMap {
         &self.invalid
     }
 
-    /// The Dirichlet energy, that of the fans included: no map with this boundary has less.
+    /// Its energy, that of the fans included: no map with this boundary has less.
     pub fn energy(&self) -> f64 {
         self.energy
     }

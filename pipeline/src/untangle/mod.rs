@@ -62,13 +62,14 @@ pub struct Report {
     pub method: Method,
     /// Newton steps, over all patches and attempts.
     pub iterations: usize,
-    /// Nodes of the chart whose place differs from that in the harmonic map.
+    /// Nodes of the chart whose uv differ from those in the unconstrained minimiser.
     pub nodes_moved: usize,
-    /// Dirichlet energy of the harmonic map: a lower bound.
-    pub energy_harmonic: f64,
-    /// Dirichlet energy of the degree-elevated linear map.
+    /// The objective at its unconstrained minimiser, which may be invalid: a lower bound. For the Dirichlet energy that
+    /// is the harmonic map.
+    pub energy_unconstrained: f64,
+    /// The objective at the start, the degree-elevated linear map.
     pub energy_start: f64,
-    /// Dirichlet energy of the result.
+    /// The objective at the result.
     pub energy: f64,
     /// The gradient of the last barrier problem in the norm of its inverse Hessian, relative to the root of twice
     /// the energy; the largest over all patches. Zero where nothing was minimised.
@@ -77,14 +78,14 @@ pub struct Report {
 
 impl Report {
     /// The report where the start itself is the result.
-    pub(crate) fn of_start(self, chart: &FilledChart, start: &[GridPoint], harmonic: &QuadraticMap) -> Self {
-        let nodes_moved = nodes_moved(chart, start, harmonic);
+    pub(crate) fn of_start(self, chart: &FilledChart, start: &[GridPoint], minimiser: &QuadraticMap) -> Self {
+        let nodes_moved = nodes_moved(chart, start, minimiser);
         Self { method: Method::Start, nodes_moved, energy: self.energy_start, gradient_norm: 0.0, ..self }
     }
 }
 
-fn nodes_moved(chart: &FilledChart, nodes: &[GridPoint], harmonic: &QuadraticMap) -> usize {
-    (0..chart.chart_nodes()).filter(|n| nodes[*n] != harmonic.nodes()[*n]).count()
+fn nodes_moved(chart: &FilledChart, nodes: &[GridPoint], minimiser: &QuadraticMap) -> usize {
+    (0..chart.chart_nodes()).filter(|n| nodes[*n] != minimiser.nodes()[*n]).count()
 }
 
 /// A map with a point in each hole, believed to be valid: [`crate::certify`] decides.
@@ -112,8 +113,12 @@ impl Stats {
     }
 }
 
-/// Untangles the `harmonic` map of `chart`, the minimiser of `objective` that may be invalid; `start` is the valid
-/// degree-elevated linear map with the same boundary. The result is the start itself where nothing better is found.
+/// Finds a valid map of `chart` whose `objective` is as small as it can be near by.
+///
+/// `minimiser` is the map that minimises `objective` with this boundary, valid or not: where it is valid, it is the result.
+/// For [`Dirichlet`] that is the harmonic map ([`crate::map::quadratic::quadratic_map`]); for another objective make it with
+/// [`QuadraticMap::of`]. `start` is a valid map with the same boundary, as the degree-elevated linear map is, and is the
+/// result itself where nothing better is found. The objective is evaluated at invalid maps, too: it must be finite there.
 ///
 /// # Errors
 /// [`Interrupted`].
@@ -143,23 +148,23 @@ impl Stats {
 /// assert!(!harmonic.invalid().is_empty());
 /// let objective = Dirichlet::new(chart.shapes());
 /// let report = untangle(&chart, &objective, &start, &harmonic, &NoMonitor)?.report;
-/// assert!(report.energy_harmonic < report.energy && report.energy < report.energy_start);
+/// assert!(report.energy_unconstrained < report.energy && report.energy < report.energy_start);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn untangle<O: Objective>(
     chart: &FilledChart,
     objective: &O,
     start: &[GridPoint],
-    harmonic: &QuadraticMap,
+    minimiser: &QuadraticMap,
     monitor: &dyn Monitor,
 ) -> Result<Untangled, Interrupted> {
     let mut stats = Stats::default();
-    let found = best(chart, objective, start, harmonic, &mut stats, &Checkpoint::new(monitor))?;
+    let found = best(chart, objective, start, minimiser, &mut stats, &Checkpoint::new(monitor))?;
     let report = Report {
         method: found.method,
         iterations: stats.iterations,
-        nodes_moved: nodes_moved(chart, &found.nodes, harmonic),
-        energy_harmonic: total(chart, objective, harmonic.uv()),
+        nodes_moved: nodes_moved(chart, &found.nodes, minimiser),
+        energy_unconstrained: total(chart, objective, minimiser.uv()),
         energy_start: total_on_grid(chart, objective, start),
         energy: total_on_grid(chart, objective, &found.nodes),
         gradient_norm: stats.decrement.max(0.0).sqrt(),
@@ -189,7 +194,7 @@ fn best<O: Objective>(
     chart: &FilledChart,
     objective: &O,
     start: &[GridPoint],
-    harmonic: &QuadraticMap,
+    minimiser: &QuadraticMap,
     stats: &mut Stats,
     checkpoint: &Checkpoint,
 ) -> Result<Found, Interrupted> {
@@ -198,12 +203,12 @@ fn best<O: Objective>(
         let hole_centres = valid(chart, &nodes)?;
         Some(Found { method, nodes, hole_centres })
     };
-    if let Some(found) = found_if_valid(Method::Harmonic, harmonic.nodes().to_vec()) {
+    if let Some(found) = found_if_valid(Method::Harmonic, minimiser.nodes().to_vec()) {
         return Ok(found);
     }
-    let are_few_invalid = harmonic.invalid().len() as f64 <= FEW * chart.chart_triangles() as f64;
+    let are_few_invalid = minimiser.invalid().len() as f64 <= FEW * chart.chart_triangles() as f64;
     if are_few_invalid {
-        match patch::untangle(chart, objective, start, harmonic, stats, checkpoint) {
+        match patch::untangle(chart, objective, start, minimiser, stats, checkpoint) {
             Ok(nodes) => {
                 if let Some(found) = found_if_valid(Method::Patch, nodes) {
                     return Ok(found);
