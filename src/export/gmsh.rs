@@ -139,6 +139,7 @@ fn narrow(charts: &[CertifiedChart], network: &SeamNetwork, adapted: &[usize], s
         found.push(gmsh::Narrow { size: size * 0.5_f64.powi(halvings as i32), ..gmsh::Narrow::default() });
     }
     for (curve, wanted) in network.curves().iter().zip(wanted_sizes(charts, network)) {
+        // However narrow the place, no smaller than gives that many edges.
         if let Some(class) = size_class(size, wanted.max(curve.length() / MOST_EDGES)) {
             found[class].curves.push(curve.id().index());
             found[class].longest = found[class].longest.max(curve.length());
@@ -146,6 +147,7 @@ fn narrow(charts: &[CertifiedChart], network: &SeamNetwork, adapted: &[usize], s
     }
     for chart in charts.iter().map(CertifiedChart::chart) {
         let Extent { area, perimeter } = Extent::of(chart, network);
+        // Larger ones have smaller elements along their curves only.
         if area > SMALL * size * size {
             continue;
         }
