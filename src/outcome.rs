@@ -95,6 +95,17 @@ impl Reason {
     }
 
     /// The state that this reason leads to.
+    ///
+    /// ```
+    /// use planish::outcome::{Code, Reason, Status};
+    ///
+    /// // Of the input: another file, or another limit, helps.
+    /// assert_eq!(Reason::new(Code::Malformed, "line 3: ...").status(), Status::Refused);
+    /// assert_eq!(Reason::new(Code::JobTime, "it took more than 60 s").status(), Status::Refused);
+    /// // Of planish.
+    /// assert_eq!(Reason::new(Code::Internal, "a panic").status(), Status::Failed);
+    /// assert_eq!(Code::NotAMesh.name(), "not_a_mesh");
+    /// ```
     pub fn status(&self) -> Status {
         if matches!(self.code, Code::Internal | Code::Crashed) { Status::Failed } else { Status::Refused }
     }

@@ -54,6 +54,19 @@ impl Budget {
     }
 
     /// Takes `bytes` if they are there and nobody waits for them.
+    ///
+    /// ```
+    /// use planish::conveyor::budget::{Account, Budget};
+    ///
+    /// let budget = Budget::new(100);
+    /// // An empty account gets what it asks for, whatever the limit: what is larger than the budget is done, too.
+    /// assert!(budget.try_take(Account::Input(2), 500));
+    /// assert!(!budget.try_take(Account::Input(2), 1));
+    /// assert!(budget.try_take(Account::Factor, 50));
+    /// budget.give_back(Account::Input(2), 500);
+    /// assert!(budget.try_take(Account::Factor, 50));
+    /// assert!(!budget.try_take(Account::Factor, 1));
+    /// ```
     pub fn try_take(&self, account: Account, bytes: u64) -> bool {
         let mut state = self.state.lock();
         let granted = state.waiting[account.index()].is_empty() && self.fits(&state, account, bytes);
@@ -71,6 +84,7 @@ impl Budget {
     /// Waits until `bytes` are there, and takes them.
     pub fn take(&self, account: Account, bytes: u64, turn: Turn) {
         let mut state = self.state.lock();
+        // The ticket tells requests of the same turn apart, in the order in which they came.
         state.tickets += 1;
         let me = (turn, state.tickets);
         state.waiting[account.index()].insert(me);
@@ -79,6 +93,7 @@ impl Budget {
         }
         state.waiting[account.index()].remove(&me);
         state.taken[account.index()] += bytes;
+        // Whoever is first of the account now may fit, too.
         self.given_back.notify_all();
     }
 
@@ -89,8 +104,13 @@ impl Budget {
     }
 
     fn fits(&self, state: &State, account: Account, bytes: u64) -> bool {
-        let taken = state.taken.iter().fold(0, |sum: u64, taken| sum.saturating_add(*taken));
-        state.taken[account.index()] == 0 || taken.saturating_add(bytes) <= self.limit
+        // An empty account gets whatever it asks for: so nobody waits for ever.
+        if state.taken[account.index()] == 0 {
+            return true;
+        }
+        // Sizes may be made up, as those of sparse files are.
+        let taken = state.taken.iter().fold(bytes, |sum, taken| sum.saturating_add(*taken));
+        taken <= self.limit
     }
 }
 

@@ -85,15 +85,27 @@ fn memory(job: &Job) -> u64 {
 impl InFlight {
     /// Takes a job up, once there is memory for its data.
     pub fn begin(shared: &Arc<Shared>, Waiting { job, turn }: Waiting) -> Arc<Self> {
+        // Seen from outside before it waits for memory.
         let number = shared.progress.add(&job);
         let is_to_be_done = job.is_wanted() && job.doubted.is_none();
         let foretold = if is_to_be_done { memory(&job) } else { 0 };
         shared.grants.take(Account::Input(lane(job.bytes)), foretold, turn);
         let span = tracing::info_span!("job", input = escape(&job.name));
         let suspect = Mutex::new(span.in_scope(|| begin(shared, &job)));
-        let (settings, memory) = (shared.settings(), foretold.into());
-        let (shared, seconds, end) = (shared.clone(), Mutex::default(), Mutex::new(None));
-        Arc::new(Self { shared, job, number, settings, turn, suspect, foretold, memory, span, seconds, end })
+        Arc::new(Self {
+            shared: shared.clone(),
+            job,
+            number,
+            // After the wait: those that are in force when work begins.
+            settings: shared.settings(),
+            turn,
+            suspect,
+            foretold,
+            memory: AtomicU64::new(foretold),
+            span,
+            seconds: Mutex::default(),
+            end: Mutex::new(None),
+        })
     }
 
     /// What it takes from reading to writing, factors apart, as it was foretold by its size: in bytes.
@@ -148,8 +160,9 @@ impl InFlight {
         let _in_stage = self.in_stage(stage);
         let started = vitals::processor_of_this_thread();
         let result = if self.job.is_wanted() { guard(|| work(&permit)) } else { Err(Abort::Unwanted) };
-        *self.seconds.lock().entry(stage.name()).or_insert(0.0) +=
-            (vitals::processor_of_this_thread() - started).as_secs_f64();
+        let taken = vitals::processor_of_this_thread() - started;
+        *self.seconds.lock().entry(stage.name()).or_insert(0.0) += taken.as_secs_f64();
+        // It may have been cancelled meanwhile: then nothing goes on, whatever came out.
         if self.job.is_wanted() { result } else { Err(Abort::Unwanted) }
     }
 
@@ -179,13 +192,18 @@ impl InFlight {
 
     /// The processor time of all stages so far. Milliseconds are enough, and read well.
     pub fn timing(&self) -> BTreeMap<String, f64> {
-        let seconds = self.seconds.lock();
-        seconds.iter().map(|(stage, s)| ((*stage).to_owned(), (s * 1e3).round() / 1e3)).collect()
+        let mut timing = BTreeMap::new();
+        for (stage, seconds) in self.seconds.lock().iter() {
+            timing.insert((*stage).to_owned(), (seconds * 1e3).round() / 1e3);
+        }
+        timing
     }
 
     /// The data of the input is gone: others may take its memory.
     pub fn give_memory_back(&self) {
-        self.shared.grants.give_back(Account::Input(lane(self.job.bytes)), self.memory.swap(0, Ordering::Relaxed));
+        // Once only, whoever comes first: the last stage, or the end of the job.
+        let bytes = self.memory.swap(0, Ordering::Relaxed);
+        self.shared.grants.give_back(Account::Input(lane(self.job.bytes)), bytes);
     }
 
     /// How the job ended.
@@ -200,6 +218,7 @@ impl Drop for InFlight {
         self.shared.progress.remove(self.number);
         self.shared.step();
         self.shared.queue.ended(&self.job);
+        // Nobody told how it ended: a stage broke down.
         let end = self.end.get_mut().take().unwrap_or(End::Lost);
         // Fails only where nobody asks any more.
         let _ = self.shared.ended.send(Completion { job: self.job.clone(), end });
@@ -245,9 +264,11 @@ impl Monitor for Permit<'_> {
     fn reserve(&self, bytes: u64) {
         let InFlight { shared, turn, job, .. } = self.0;
         if !job.is_wanted() {
+            // It ends at its next safe point, and must not wait until then.
             shared.grants.overdraw(Account::Factor, bytes);
         } else if !shared.grants.try_take(Account::Factor, bytes) {
             tracing::debug!(bytes, "waits for memory");
+            // Nobody waits while it holds a place to compute: those inside may be the ones who give memory back.
             shared.grants.leave();
             shared.grants.take(Account::Factor, bytes, *turn);
             shared.grants.enter(*turn);

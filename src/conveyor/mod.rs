@@ -48,27 +48,28 @@ use parking_lot::RwLock;
 use planish_core::mesh::TriangleSoup;
 use planish_core::monitor::Monitor;
 use planish_core::{CertifiedChart, ChartJob, MappedChart, Plan};
-use progress::Running;
+use progress::{Progress, Running};
 use queue::Queue;
 use reading::Next;
 use stage::Stage;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use surface::{PartIndex, Surface};
 use writing::{After, Sink};
 
-/// Ended jobs that nobody has asked for yet, at most.
+/// Ended jobs that nobody has asked for yet, at most. By experience: with fewer, the stages would wait while a daemon
+/// looks at its inbox; with more, more reports are in memory.
 const ENDED: usize = 64;
 
 /// Results that wait for their commands, or to be put in place, at most: the former hold no memory to speak of, the latter
 /// what the budget gives them.
 pub const CHAINED: usize = 1024;
 
-/// Results that are written at once, per lane: writing waits for the disk.
+/// Results that are written at once, per lane, where `--jobs` is less: writing waits for the disk, not for a processor.
 const WRITERS: usize = 4;
 
 /// The running stages.
@@ -95,6 +96,7 @@ impl Conveyor {
         }
         let chain = after.chain.clone();
         conveyor.thread("parked", move || writing::look_after(to_look_after, &chain))?;
+        // Each lane has its own: the stages behind end when the last lane lets go of its senders.
         drop(after);
         conveyor.stage("chain", settings.commands, chained, follow_up)?;
         Ok(conveyor)
@@ -114,19 +116,28 @@ impl Conveyor {
         Ok(conveyor)
     }
 
+    /// A conveyor without threads.
     fn idle(settings: &Settings, sink: Sink, grants: Arc<dyn Grants>, begun: Option<Begun>, is_patient: bool) -> Self {
         let (ended, to_tell) = bounded(ENDED);
-        let settings = RwLock::new(Arc::new(settings.clone()));
-        let (queue, progress) = (Queue::default(), progress::Progress::default());
-        let (steps, deaths) = Default::default();
-        let shared =
-            Arc::new(Shared { settings, sink, begun, is_patient, queue, grants, progress, ended, steps, deaths });
-        Self { shared, ended: to_tell, threads: Vec::new() }
+        let shared = Shared {
+            settings: RwLock::new(Arc::new(settings.clone())),
+            sink,
+            begun,
+            is_patient,
+            queue: Queue::default(),
+            grants,
+            progress: Progress::default(),
+            ended,
+            steps: AtomicU64::new(0),
+            deaths: AtomicU64::new(0),
+        };
+        Self { shared: Arc::new(shared), ended: to_tell, threads: Vec::new() }
     }
 
     /// Starts the stages of one lane.
     fn lane(&mut self, lane: usize, after: &Arc<After>) -> std::io::Result<()> {
         let jobs = self.shared.settings().jobs;
+        // What is large waits before it is read, not behind that: one soup, and `--jobs` charts, per lane.
         let (soups, to_cut) = bounded(1);
         let (apart, to_do_apart) = bounded(1);
         let (charts, to_map) = bounded(jobs);
@@ -226,6 +237,7 @@ impl Conveyor {
     /// Waits until all stages have ended, after [`Self::close`]; what ends meanwhile is not told any more.
     pub fn join(self) {
         for thread in self.threads {
+            // A full channel of ends would keep the last stage from ending.
             while !thread.is_finished() {
                 let _ = self.ended.recv_timeout(Duration::from_millis(5));
             }
@@ -306,6 +318,7 @@ fn cut(Soup { in_flight, mut facts, soup }: Soup, charts: &Sender<Cut>, finished
         Err(why) => hand_on(finished, Finished::Abort(in_flight, Box::new(facts), why)),
         Ok(Plan { mesh, jobs, .. }) => {
             let surface = Surface::new(in_flight, mesh, jobs.len(), facts);
+            // The stages behind work on the first charts while the last ones wait here for room in the channel.
             for (i, job) in jobs.into_iter().enumerate() {
                 hand_on(charts, Cut { surface: surface.clone(), part_index: (i, 0), job });
             }
@@ -320,6 +333,7 @@ fn map(Cut { surface, part_index, job }: Cut, untangle: &Sender<Mapped>, finishe
     match parts {
         Err(why) => complete_part(surface, part_index, Err(why), finished),
         Ok(parts) => {
+            // Before the first of them travels on: the surface must not be taken for complete.
             surface.expect(parts.len() - 1);
             for (k, mapped) in parts.into_iter().enumerate() {
                 hand_on(untangle, Mapped { surface: surface.clone(), part_index: (part_index.0, k), mapped });

@@ -12,11 +12,12 @@ use std::sync::Arc;
 /// A place in virtual time: who comes first has the smaller one.
 pub type Turn = u64;
 
-/// What every job costs beside its bytes, in bytes.
+/// What every job costs beside its bytes, in bytes. By experience: without it, any number of tiny files would pass a large
+/// one; much more, and they would not pass at all.
 const OVERHEAD: u64 = 16 << 10;
 
 /// Jobs below these sizes (bytes) travel apart from larger ones, so that a stage never waits for a job that is
-/// thousands of times as large.
+/// thousands of times as large. By experience: more lanes take more threads, and more memory for what waits in them.
 const CLASSES: [u64; LANES - 1] = [1 << 20, 16 << 20];
 
 /// How many classes of size there are, and thus lanes.
@@ -32,6 +33,20 @@ pub struct Waiting {
 }
 
 /// The jobs that wait.
+///
+/// ```
+/// use planish::conveyor::queue::Queue;
+/// use planish::input::job::Job;
+/// use std::sync::Arc;
+///
+/// let queue = Queue::default();
+/// for (name, bytes) in [("large", 900_000), ("small", 1_000)] {
+///     queue.push(Arc::new(Job::new(name.into(), name.into(), bytes)));
+/// }
+/// // Small ones pass, until as many bytes as the large one has were done.
+/// let first = queue.pop(0).expect("a job");
+/// assert_eq!(first.job.name, std::path::Path::new("small"));
+/// ```
 #[derive(Debug, Default)]
 pub struct Queue {
     state: Mutex<State>,
@@ -48,6 +63,13 @@ struct State {
 }
 
 /// The lane for an input of `bytes`.
+///
+/// ```
+/// use planish::conveyor::queue::lane;
+///
+/// let (kib, mib) = (1 << 10, 1 << 20);
+/// assert_eq!([lane(20 * kib), lane(mib), lane(15 * mib), lane(16 * mib)], [0, 1, 1, 2]);
+/// ```
 pub fn lane(bytes: u64) -> usize {
     CLASSES.iter().take_while(|limit| bytes >= **limit).count()
 }
@@ -106,7 +128,8 @@ impl Queue {
         let state = self.state.lock();
         let mut all: Vec<_> = state.lanes.iter().flatten().collect();
         all.sort_by_key(|(place, _)| **place);
-        all.into_iter().filter(|(_, w)| w.job.is_wanted()).map(|(_, w)| w.job.clone()).collect()
+        let wanted = all.into_iter().filter(|(_, waiting)| waiting.job.is_wanted());
+        wanted.map(|(_, waiting)| waiting.job.clone()).collect()
     }
 }
 

@@ -41,6 +41,7 @@ impl PrioritySemaphore {
         state.tickets += 1;
         let me = (turn, state.tickets);
         state.waiting.insert(me);
+        // Only the first in the order of turns goes in: a place that another would take is left to it.
         while state.free == 0 || state.waiting.first() != Some(&me) {
             self.hint(&state);
             self.moved.wait(&mut state);
@@ -48,6 +49,7 @@ impl PrioritySemaphore {
         state.waiting.remove(&me);
         state.free -= 1;
         self.hint(&state);
+        // Whoever is first now was woken before, perhaps, and went back to sleep as it was not.
         if state.free > 0 {
             self.moved.notify_all();
         }

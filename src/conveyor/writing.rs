@@ -101,7 +101,8 @@ pub(super) fn write(finished: Finished, after: &After) {
 
 /// The files, unless they are too large together.
 fn not_too_large(files: Files, in_flight: &InFlight) -> Result<Files, Reason> {
-    let (bytes, most) = (files.iter().map(|(_, content)| content.len() as u64).sum(), in_flight.settings.limits.result);
+    let bytes: u64 = files.iter().map(|(_, content)| content.len() as u64).sum();
+    let most = in_flight.settings.limits.result;
     if bytes <= most {
         return Ok(files);
     }
@@ -183,9 +184,14 @@ pub(super) fn look_after(parked: Receiver<Ready>, chain: &Sender<Chained>) {
             Ok(ready) => waiting.push(Parked::new(ready, 1)),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) if waiting.is_empty() => return,
+            // No more come, so nothing keeps this loop from spinning but a pause.
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(LOOK),
         }
-        waiting = waiting.into_iter().filter_map(|one| look_at(one, chain)).collect();
+        let mut still_waiting = Vec::new();
+        for one in waiting {
+            still_waiting.extend(look_at(one, chain));
+        }
+        waiting = still_waiting;
     }
 }
 

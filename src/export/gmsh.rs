@@ -78,7 +78,7 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64, monitor: &dyn Monitor) -> Result<
     let mut report = ExportReport { size, shortest_seam_distance, ..ExportReport::default() };
     report.warning = shortest_seam_distance.filter(|d| size > 0.5 * d).map(|d| too_coarse(size, d));
     let natural = natural_maps(charts, monitor)?;
-    let straight: Vec<_> = natural.iter().map(|n| n.as_ref().map(|n| &n.map)).collect();
+    let straight: Vec<_> = natural.iter().map(|found| found.as_ref().map(|n| &n.map)).collect();
     let linear = match subdivide(atlas, &straight) {
         Ok(linear) => linear,
         Err(error) => {
@@ -87,10 +87,7 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64, monitor: &dyn Monitor) -> Result<
             return Ok(Export { files: vec![], report: ExportReport { failure: Some(failure), ..report } });
         }
     };
-    let mut distortions: Vec<Summary> = charts.iter().map(|c| *c.distortion()).collect();
-    for chart in linear.straight_charts().iter().map(|c| c.index()) {
-        distortions[chart] = natural[chart].as_ref().map_or(distortions[chart], |n| n.distortion);
-    }
+    let distortions = distortions_of_written(charts, &natural, &linear);
     let algorithms = algorithms(charts, &linear, &distortions, size);
     let narrow = narrow(charts, network, &algorithms.adapted, size);
     let mut spikes = spikes(mesh, charts, linear.curvatures(), size);
@@ -108,46 +105,71 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64, monitor: &dyn Monitor) -> Result<
     Ok(Export { files: files(atlas, &linear, &script), report })
 }
 
-/// Maps with a boundary of their own for the charts whose maps stretch, where these do less.
+/// Maps with a boundary of their own for the charts whose maps stretch, where these do less; one entry per chart.
 fn natural_maps(charts: &[CertifiedChart], monitor: &dyn Monitor) -> Result<Vec<Option<Natural>>, Interrupted> {
-    let of_chart = |certified: &CertifiedChart| {
+    let mut maps = Vec::with_capacity(charts.len());
+    for certified in charts {
         let p99 = certified.distortion().conformal_p99;
-        if p99 <= BENT {
-            return Ok(None);
+        maps.push(if p99 > BENT { natural(certified.chart(), p99, monitor)? } else { None });
+    }
+    Ok(maps)
+}
+
+/// The distortion of each chart's map as it is written: the natural one where the subdivision took that, else the
+/// certified one.
+fn distortions_of_written(
+    charts: &[CertifiedChart],
+    natural: &[Option<Natural>],
+    linear: &LinearAtlas,
+) -> Vec<Summary> {
+    let mut distortions: Vec<Summary> = charts.iter().map(|chart| *chart.distortion()).collect();
+    for chart in linear.straight_charts() {
+        if let Some(natural) = &natural[chart.index()] {
+            distortions[chart.index()] = natural.distortion;
         }
-        natural(certified.chart(), p99, monitor)
-    };
-    charts.iter().map(of_chart).collect()
+    }
+    distortions
 }
 
 /// The curves along narrow places and the small charts, by the size of elements there: half of `size`, a quarter, and so on.
 /// `adapted` are the charts that MeshAdapt makes, ascending.
 fn narrow(charts: &[CertifiedChart], network: &SeamNetwork, adapted: &[usize], size: f64) -> Vec<gmsh::Narrow> {
-    let halved = |n: u32| gmsh::Narrow { size: size * 0.5_f64.powi(n as i32), ..gmsh::Narrow::default() };
-    let mut found: Vec<gmsh::Narrow> = (1..=gmsh::Narrow::HALVINGS).map(halved).collect();
-    let class = |wanted: f64| {
-        let halvings = (size / wanted).log2().round().clamp(1.0, f64::from(gmsh::Narrow::HALVINGS));
-        (wanted < NARROW * size).then_some(halvings as usize - 1)
-    };
+    let mut found = Vec::new();
+    for halvings in 1..=gmsh::Narrow::HALVINGS {
+        found.push(gmsh::Narrow { size: size * 0.5_f64.powi(halvings as i32), ..gmsh::Narrow::default() });
+    }
     for (curve, wanted) in network.curves().iter().zip(wanted_sizes(charts, network)) {
-        if let Some(class) = class(wanted.max(curve.length() / MOST_EDGES)) {
+        // However narrow the place, no smaller than gives that many edges.
+        if let Some(class) = size_class(size, wanted.max(curve.length() / MOST_EDGES)) {
             found[class].curves.push(curve.id().index());
             found[class].longest = found[class].longest.max(curve.length());
         }
     }
     for chart in charts.iter().map(CertifiedChart::chart) {
         let Extent { area, perimeter } = Extent::of(chart, network);
+        // Larger ones have smaller elements along their curves only.
         if area > SMALL * size * size {
             continue;
         }
         let is_adapted = adapted.binary_search(&chart.id().index()).is_ok();
         let inside = if is_adapted { 0.5 * size } else { size };
-        if let Some(class) = class(inside.min(perimeter / EDGES_PER_LOOP)) {
+        if let Some(class) = size_class(size, inside.min(perimeter / EDGES_PER_LOOP)) {
             found[class].surfaces.push(chart.id().index());
         }
     }
     found.retain(|n| !n.curves.is_empty() || !n.surfaces.is_empty());
     found
+}
+
+/// The class for elements of the `wanted` size: 0 for half of `size`, 1 for a quarter, and so on; none where `size` itself
+/// will do.
+fn size_class(size: f64, wanted: f64) -> Option<usize> {
+    if wanted < NARROW * size {
+        let halvings = (size / wanted).log2().round();
+        Some(halvings.clamp(1.0, f64::from(gmsh::Narrow::HALVINGS)) as usize - 1)
+    } else {
+        None
+    }
 }
 
 /// The area of a chart.
@@ -201,14 +223,15 @@ fn wanted_sizes(charts: &[CertifiedChart], network: &SeamNetwork) -> Vec<f64> {
 
 /// Per chart, whether it shares two curves without a common end with another.
 fn sheets(charts: usize, network: &SeamNetwork) -> Vec<bool> {
+    // The ends of the curves that each pair of charts has been found to share.
     let mut shared: BTreeMap<[usize; 2], Vec<[usize; 2]>> = BTreeMap::new();
     let mut are_sheets = vec![false; charts];
     for curve in network.curves() {
-        let sides = || curve.sides().iter().map(|s| s.chart.index());
-        for pair in sides().flat_map(|a| sides().map(move |b| [a, b])).filter(|[a, b]| a < b) {
-            let others = shared.entry(pair).or_default();
-            if others.iter().any(|ends| ends.iter().all(|e| !curve.ends().contains(e))) {
-                pair.iter().for_each(|c| are_sheets[*c] = true);
+        for [a, b] in pairs_beside(curve) {
+            let others = shared.entry([a, b]).or_default();
+            if others.iter().any(|other| are_disjoint(*other, curve.ends())) {
+                are_sheets[a] = true;
+                are_sheets[b] = true;
             }
             others.push(curve.ends());
         }
@@ -216,25 +239,53 @@ fn sheets(charts: usize, network: &SeamNetwork) -> Vec<bool> {
     are_sheets
 }
 
+/// The pairs of charts that meet along a curve, each with the smaller number first. A curve may have more than two sides.
+fn pairs_beside(curve: &Curve) -> Vec<[usize; 2]> {
+    let mut pairs = Vec::new();
+    for first in curve.sides() {
+        for second in curve.sides() {
+            let pair = [first.chart.index(), second.chart.index()];
+            if pair[0] < pair[1] {
+                pairs.push(pair);
+            }
+        }
+    }
+    pairs
+}
+
+/// Whether two curves with these ends have no end in common.
+fn are_disjoint(ends: [usize; 2], others: [usize; 2]) -> bool {
+    ends.iter().all(|end| !others.contains(end))
+}
+
 /// MeshAdapt where maps stretch, in a unit in which it searches little more than a tenth of an edge around a point.
 fn algorithms(charts: &[CertifiedChart], linear: &LinearAtlas, distortions: &[Summary], size: f64) -> gmsh::Algorithms {
-    let stretches = |c: usize| {
-        let Summary { conformal_p99, area_ratio, .. } = distortions[c];
-        let is_quick = area_of(charts[c].chart()) < QUICK * size * size && area_ratio < EVEN;
-        let is_linear = linear.linear_charts().binary_search(&ChartId::at(c)).is_ok();
-        let is_natural = linear.straight_charts().binary_search(&ChartId::at(c)).is_ok();
-        is_linear || conformal_p99 > if is_quick && !is_natural { BENT } else { STRETCHED }
-    };
-    // Gmsh takes the plane of flat charts for their map.
-    let is_flat = |c: usize| {
-        let chart = &linear.charts()[c];
-        let points: Vec<_> = chart.nodes().iter().map(|n| linear.points()[*n as usize]).collect();
-        Plane::of(&points, chart.triangles()).is_some()
-    };
-    let is_adapted = |c: &usize| stretches(*c) && !is_flat(*c);
-    let adapted: Vec<usize> = (0..distortions.len()).filter(is_adapted).collect();
-    let needed = !adapted.is_empty() && size < 10.0 * SEARCHED;
-    gmsh::Algorithms { adapted, enlarged: if needed { 2.0 * unit_scale(size) } else { 1.0 } }
+    let mut adapted = Vec::new();
+    for (c, distortion) in distortions.iter().enumerate() {
+        if stretches(charts[c].chart(), linear, distortion, size) && !is_flat(linear, c) {
+            adapted.push(c);
+        }
+    }
+    let is_enlarged = !adapted.is_empty() && size < 10.0 * SEARCHED;
+    gmsh::Algorithms { adapted, enlarged: if is_enlarged { 2.0 * unit_scale(size) } else { 1.0 } }
+}
+
+/// Whether the map of a chart stretches too much for the other algorithms.
+fn stretches(chart: &Chart, linear: &LinearAtlas, distortion: &Summary, size: f64) -> bool {
+    // What is handed over is the linear map; the distortion is that of the certified one.
+    if linear.linear_charts().binary_search(&chart.id()).is_ok() {
+        return true;
+    }
+    let is_quick = area_of(chart) < QUICK * size * size && distortion.area_ratio < EVEN;
+    let is_natural = linear.straight_charts().binary_search(&chart.id()).is_ok();
+    distortion.conformal_p99 > if is_quick && !is_natural { BENT } else { STRETCHED }
+}
+
+/// Whether a chart lies in a plane, which Gmsh then takes for its map.
+fn is_flat(linear: &LinearAtlas, chart: usize) -> bool {
+    let chart = &linear.charts()[chart];
+    let points: Vec<_> = chart.nodes().iter().map(|n| linear.points()[*n as usize]).collect();
+    Plane::of(&points, chart.triangles()).is_some()
 }
 
 fn files(atlas: &CertifiedAtlas, linear: &LinearAtlas, script: &gmsh::Script) -> Vec<(String, Vec<u8>)> {
@@ -242,8 +293,10 @@ fn files(atlas: &CertifiedAtlas, linear: &LinearAtlas, script: &gmsh::Script) ->
         (result_files::ATLAS_MSH.to_owned(), gmsh::atlas(atlas, linear)),
         (result_files::REMESH.to_owned(), gmsh::remesh(script)),
     ];
-    let enlarged = Some(script.algorithms.enlarged).filter(|factor| *factor != 1.0);
-    files.extend(enlarged.map(|by| (result_files::ENLARGED_MSH.to_owned(), gmsh::enlarged(linear, atlas.seams(), by))));
+    let factor = script.algorithms.enlarged;
+    if factor != 1.0 {
+        files.push((result_files::ENLARGED_MSH.to_owned(), gmsh::enlarged(linear, atlas.seams(), factor)));
+    }
     files
 }
 
@@ -284,17 +337,22 @@ fn too_coarse_for_spikes(size: f64, spikes: usize) -> String {
 
 /// Why there is no hand-off, with a triangle by its number in the input.
 fn failure(error: &subdivide::Error, charts: &[CertifiedChart]) -> String {
-    let source = |chart: &ChartId, face: &FaceId| {
-        let chart = charts.get(chart.index()).map(CertifiedChart::chart);
-        let known = chart.filter(|c| face.index() < c.triangles().len());
-        known.map_or(String::new(), |c| format!(" (triangle {} of the input)", c.source_triangle(face.index())))
-    };
-    let place = match error {
-        subdivide::Error::Inverted(i) => source(&i.chart, &i.face),
-        subdivide::Error::NoNormal { chart, face } => source(chart, face) + "; use a larger unit of length",
+    let location = match error {
+        subdivide::Error::Inverted(inverted) => source(charts, inverted.chart, inverted.face),
+        subdivide::Error::NoNormal { chart, face } => source(charts, *chart, *face) + "; use a larger unit of length",
         subdivide::Error::MeetsItself { .. } | subdivide::Error::Pinched { .. } => String::new(),
     };
-    format!("{error}{place}")
+    format!("{error}{location}")
+}
+
+/// Names a face of a chart by its number in the input; empty where the chart has no such face.
+fn source(charts: &[CertifiedChart], chart: ChartId, face: FaceId) -> String {
+    match charts.get(chart.index()).map(CertifiedChart::chart) {
+        Some(chart) if face.index() < chart.triangles().len() => {
+            format!(" (triangle {} of the input)", chart.source_triangle(face.index()))
+        }
+        _ => String::new(),
+    }
 }
 
 #[cfg(test)]

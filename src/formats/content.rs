@@ -58,6 +58,14 @@ pub struct TooMany {
 impl TooMany {
     /// Refuses more than `limit`.
     ///
+    /// ```
+    /// use planish::formats::TooMany;
+    ///
+    /// assert_eq!(TooMany::check("points", 1000, 1000), Ok(()));
+    /// let error = TooMany::check("points", 1001, 1000).unwrap_err();
+    /// assert!(error.to_string().starts_with("1001 points exceed the limit of 1000; split the file"));
+    /// ```
+    ///
     /// # Errors
     /// This one.
     pub fn check(what: &str, count: u64, limit: u64) -> Result<(), Self> {

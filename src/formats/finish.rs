@@ -34,22 +34,28 @@ pub(super) fn content(
     notes: Notes,
     bad: &BadPoints,
 ) -> Result<Content, ReadError> {
-    let cells: Vec<(&String, &usize)> = notes.skipped.iter().filter(|(kind, _)| is_cell(kind)).collect();
-    if triangles.is_empty() && !cells.is_empty() {
-        let found: Vec<String> = cells.iter().map(|(kind, count)| counted(kind, **count)).collect();
-        let remedy = if cells.iter().any(|(kind, _)| is_volume(kind)) { OF_VOLUMES } else { OF_LINES };
-        return Err(ReadError::NoSurface { found: found.join(", "), remedy, notes: Box::new(notes) });
-    }
-    match TriangleSoup::new(points, triangles) {
-        Ok(soup) => Ok(Content { soup, notes }),
-        Err(error) => {
-            let location = match error {
-                SoupError::NotFinite { point, .. } => bad.location(point),
-                _ => None,
-            };
-            Err(ReadError::Soup { error, location, notes: Box::new(notes) })
+    let mut found = Vec::new();
+    let mut has_volumes = false;
+    for (kind, count) in &notes.skipped {
+        if is_cell(kind) {
+            found.push(counted(kind, *count));
+            has_volumes |= is_volume(kind);
         }
     }
+    // A file without any cell is told of as a soup without triangles.
+    if triangles.is_empty() && !found.is_empty() {
+        let remedy = if has_volumes { OF_VOLUMES } else { OF_LINES };
+        return Err(ReadError::NoSurface { found: found.join(", "), remedy, notes: Box::new(notes) });
+    }
+    let error = match TriangleSoup::new(points, triangles) {
+        Ok(soup) => return Ok(Content { soup, notes }),
+        Err(error) => error,
+    };
+    let location = match error {
+        SoupError::NotFinite { point, .. } => bad.location(point),
+        _ => None,
+    };
+    Err(ReadError::Soup { error, location, notes: Box::new(notes) })
 }
 
 /// What to do where there are volumes only.
@@ -83,17 +89,33 @@ fn counted(kind: &str, count: usize) -> String {
     let name = kind.trim_start_matches("VTK_").replace('_', " ");
     let name = if name == kind { name } else { name.to_lowercase() };
     let name = if name.ends_with("tetra") { name + "hedron" } else { name };
-    let digits = count.to_string();
-    let groups: Vec<&str> = digits.as_bytes().rchunks(3).rev().map(|g| std::str::from_utf8(g).unwrap_or("")).collect();
-    format!("{} {}", groups.join(","), if count == 1 { name } else { plural(name) })
+    let name = if count == 1 { name } else { plural(name) };
+    format!("{} {name}", grouped(count))
 }
 
+/// A number with a comma before each group of three digits: `11,000`.
+fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let mut grouped = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+/// The plural of the name of an element.
 fn plural(name: String) -> String {
-    let several = |end: &str, ends: &str| name.strip_suffix(end).map(|stem| format!("{stem}{ends}"));
-    several("hedron", "hedra").or(several("vertex", "vertices")).unwrap_or_else(|| {
-        let is_plural = ["s", "vertices", "type"].iter().any(|end| name.ends_with(end));
-        if is_plural { name.clone() } else { format!("{name}s") }
-    })
+    if let Some(stem) = name.strip_suffix("hedron") {
+        return format!("{stem}hedra");
+    }
+    if let Some(stem) = name.strip_suffix("vertex") {
+        return format!("{stem}vertices");
+    }
+    let is_plural = ["s", "vertices", "type"].iter().any(|end| name.ends_with(end));
+    if is_plural { name } else { format!("{name}s") }
 }
 
 #[cfg(test)]

@@ -122,6 +122,17 @@ const NO_MESHES: [&str; 16] = [
 ];
 
 /// Tells the kind of a file by its name.
+///
+/// ```
+/// use planish::formats::{Format, Kind, kind};
+///
+/// assert_eq!(kind("scans/Part.STL".as_ref()), Kind::Mesh(Format::Stl));
+/// // A mesh that planish does not read is refused, with a remedy; what lies beside meshes is passed over.
+/// assert_eq!(kind("part.meshb".as_ref()), Kind::OtherMesh("meshb".to_owned()));
+/// assert_eq!(kind("part.mtl".as_ref()), Kind::NoMesh);
+/// assert_eq!(kind(".part.stl.part".as_ref()), Kind::NoMesh);
+/// assert_eq!(kind("part.xyz".as_ref()), Kind::Unknown("xyz".to_owned()));
+/// ```
 pub fn kind(path: &Path) -> Kind {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -303,6 +314,19 @@ pub fn read_or_tell(format: Format, source: &Source) -> Result<Content, Refusal>
 
 /// Reads the bytes of a file, which its name says to be in this format; where the bytes say otherwise beyond doubt, they
 /// are believed.
+///
+/// ```
+/// use planish::formats::{Format, read_alone};
+/// use planish::outcome::Code;
+///
+/// // An OBJ file whose name ends in .stl.
+/// let content = read_alone(Format::Stl, b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("a triangle");
+/// assert_eq!(content.soup.triangles(), [[0, 1, 2]]);
+/// assert_eq!(content.notes.format, "OBJ");
+///
+/// let reason = read_alone(Format::Obj, b"v 0 0 0\nv 1 0 0\nf 1 2 3\n").expect_err("no third point").reason();
+/// assert_eq!((reason.code, reason.location.as_deref()), (Code::Malformed, Some("line 3")));
+/// ```
 ///
 /// # Errors
 /// [`ReadError`], with the place and what to do.

@@ -10,7 +10,7 @@ const FAR: usize = 1024;
 pub(super) fn sniff(bytes: &[u8]) -> Option<Format> {
     let head = &bytes[..bytes.len().min(FAR)];
     let text = head.strip_prefix(MARK).unwrap_or(head).trim_ascii_start();
-    let has = |word: &str| text.windows(word.len()).any(|w| w.eq_ignore_ascii_case(word.as_bytes()));
+    // Binary STL may begin with anything, and the words of OBJ are short: these come last.
     match text {
         _ if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") => Some(Format::Ply),
         _ if text.starts_with(b"# vtk DataFile") => Some(Format::Vtk),
@@ -18,11 +18,10 @@ pub(super) fn sniff(bytes: &[u8]) -> Option<Format> {
         _ if is_word(text, "MeshVersionFormatted") => Some(Format::Medit),
         _ if is_off(text) => Some(Format::Off),
         _ if text.starts_with(b"glTF") => Some(Format::Gltf),
-        _ if text.starts_with(b"{") && has("\"asset\"") => Some(Format::Gltf),
-        _ if text.starts_with(b"<") && has("<VTKFile") && has("UnstructuredGrid") => Some(Format::Vtu),
-        _ if text.starts_with(b"<") && has("<VTKFile") && has("PolyData") => Some(Format::Vtp),
-        // Binary files may begin with the word, too.
-        _ if is_word(text, "solid") && has("facet") && has("vertex") && !text.contains(&0) => Some(Format::Stl),
+        _ if text.starts_with(b"{") && has(text, "\"asset\"") => Some(Format::Gltf),
+        _ if is_vtk_xml(text) && has(text, "UnstructuredGrid") => Some(Format::Vtu),
+        _ if is_vtk_xml(text) && has(text, "PolyData") => Some(Format::Vtp),
+        _ if is_text_stl(text) => Some(Format::Stl),
         _ if is_binary_stl(bytes) => Some(Format::Stl),
         _ if is_obj(text) => Some(Format::Obj),
         _ => None,
@@ -58,9 +57,26 @@ pub(super) fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     }
 }
 
+/// Whether a word stands anywhere in a text, in any case.
+fn has(text: &[u8], word: &str) -> bool {
+    text.windows(word.len()).any(|part| part.eq_ignore_ascii_case(word.as_bytes()))
+}
+
+/// Whether a text is XML of VTK, of whatever data set.
+fn is_vtk_xml(text: &[u8]) -> bool {
+    text.starts_with(b"<") && has(text, "<VTKFile")
+}
+
+/// Whether a text is STL. Binary files may begin with the word, too: they hold zeros.
+fn is_text_stl(text: &[u8]) -> bool {
+    is_word(text, "solid") && has(text, "facet") && has(text, "vertex") && !text.contains(&0)
+}
+
 /// Whether there are exactly as many bytes as the count of a binary STL file says.
 fn is_binary_stl(bytes: &[u8]) -> bool {
-    let count = bytes.get(80..84).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
+    // A header of 80 bytes, the number of triangles, and 50 bytes for each.
+    let Some(count) = bytes.get(80..84).and_then(|count| count.first_chunk()) else { return false };
+    let count = u32::from_le_bytes(*count);
     count > 0 && bytes.len() as u64 == 84 + 50 * u64::from(count)
 }
 
@@ -77,15 +93,19 @@ const STATEMENTS: [&[u8]; 10] = [b"v", b"vn", b"vt", b"o", b"g", b"s", b"f", b"m
 
 /// Whether all complete lines are statements of OBJ, and one of them is a vertex.
 fn is_obj(head: &[u8]) -> bool {
-    let complete = head.iter().rposition(|b| *b == b'\n').map_or(&head[..0], |end| &head[..end]);
-    let mut vertices = 0;
-    let all = complete.split(|b| *b == b'\n').all(|line| {
+    // The last line may have been cut off by the look at the head only.
+    let Some(end) = head.iter().rposition(|byte| *byte == b'\n') else { return false };
+    let mut has_vertex = false;
+    for line in head[..end].split(|byte| *byte == b'\n') {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        // An empty line is as good as a comment.
         let statement = words.next().unwrap_or(b"#");
-        vertices += usize::from(statement == b"v" && words.count() >= 3);
-        statement.starts_with(b"#") || STATEMENTS.contains(&statement)
-    });
-    all && vertices > 0
+        if !statement.starts_with(b"#") && !STATEMENTS.contains(&statement) {
+            return false;
+        }
+        has_vertex |= statement == b"v" && words.count() >= 3;
+    }
+    has_vertex
 }
 
 /// Whether a text begins with this word, in any case.

@@ -44,6 +44,7 @@ impl<'a> Words<'a> {
     /// Passes over so many bytes, which must end at a blank or the end, and behind a word.
     pub fn advance(&mut self, bytes: usize) {
         let (passed, rest) = self.rest.split_at(bytes);
+        // A carriage return before a line feed ends no line of its own.
         let is_pair = |at: usize| passed[at] == b'\r' && passed.get(at + 1) == Some(&b'\n');
         self.line += memchr::memchr2_iter(b'\n', b'\r', passed).filter(|at| !is_pair(*at)).count();
         self.rest = rest;
@@ -72,8 +73,17 @@ impl<'a> Words<'a> {
 
 /// Where a comment begins in a line or word. (In `1.#QNAN` and `1.#IND` none does.)
 pub(super) fn comment(text: &[u8]) -> Option<usize> {
-    let is_number = |at: usize| text[..at].ends_with(b"1.") && text.get(at + 1).is_some_and(|b| b"IQS".contains(b));
-    text.iter().enumerate().filter(|(_, b)| **b == b'#').map(|(at, _)| at).find(|at| !is_number(*at))
+    for (at, byte) in text.iter().enumerate() {
+        if *byte == b'#' && !is_in_number(text, at) {
+            return Some(at);
+        }
+    }
+    None
+}
+
+/// Whether the `#` at a byte belongs to what Microsoft's libraries write for a number that is none.
+fn is_in_number(text: &[u8], at: usize) -> bool {
+    text[..at].ends_with(b"1.") && text.get(at + 1).is_some_and(|next| b"IQS".contains(next))
 }
 
 /// The words of a text with comments, which begin with `#` and end with their line.
@@ -137,19 +147,29 @@ pub(super) fn remedy(word: &[u8]) -> String {
 
 /// In which way of writing a word is a number, which is no other than that of text files, and what to do.
 pub(super) fn foreign_number(word: &[u8]) -> Option<(&'static str, &'static str)> {
+    // Longer words are no numbers that anybody writes.
     let text = std::str::from_utf8(word).ok().filter(|text| text.len() < 64 && text.parse::<f64>().is_err())?;
-    let is_number = |text: &str| text.bytes().any(|b| b.is_ascii_digit()) && text.parse::<f64>().is_ok();
     if text.contains(',') && is_number(&text.replacen(',', ".", 1)) {
         return Some(("has a decimal comma", "export with a point as decimal separator"));
     }
     // FORTRAN writes 1.0D+03, and 1.0+103 where the exponent has three digits.
-    let without_letter = || {
-        let sign = text.rfind(['+', '-']).filter(|at| *at > 0 && text.as_bytes()[at - 1].is_ascii_digit())?;
-        Some(format!("{}e{}", &text[..sign], &text[sign..]))
-    };
-    let is_fortran =
-        is_number(&text.replacen(['D', 'd', 'Q', 'q'], "e", 1)) || without_letter().is_some_and(|t| is_number(&t));
-    is_fortran.then_some(("has a Fortran exponent", "export with exponents of E, as 1.0E+03"))
+    let with_letter = text.replacen(['D', 'd', 'Q', 'q'], "e", 1);
+    if is_number(&with_letter) || with_exponent(text).is_some_and(|text| is_number(&text)) {
+        return Some(("has a Fortran exponent", "export with exponents of E, as 1.0E+03"));
+    }
+    None
+}
+
+/// Whether a text is a number of digits. (`inf` and `nan` are numbers, too.)
+fn is_number(text: &str) -> bool {
+    text.bytes().any(|byte| byte.is_ascii_digit()) && text.parse::<f64>().is_ok()
+}
+
+/// A text with the letter of an exponent before the sign that follows a digit, if there is one: `1.0e+103` for `1.0+103`.
+fn with_exponent(text: &str) -> Option<String> {
+    let sign = text.rfind(['+', '-'])?;
+    let follows_digit = sign > 0 && text.as_bytes()[sign - 1].is_ascii_digit();
+    follows_digit.then(|| format!("{}e{}", &text[..sign], &text[sign..]))
 }
 
 /// The whole number that a word is.

@@ -59,7 +59,9 @@ impl Metrics {
     pub fn write(&mut self, status: &Status, more: More) {
         let now = Instant::now();
         (self.next, self.earliest) = (now + PERIOD, now + REST);
-        let written = text(status, more).map_err(io::Error::other).and_then(|text| put(&self.path, text.as_bytes()));
+        let text = text(status, more).map_err(io::Error::other);
+        let written = text.and_then(|text| put(&self.path, text.as_bytes()));
+        // Told once, not every time, until it can be written again.
         if let Err(error) = &written
             && self.is_written
         {
@@ -74,7 +76,10 @@ fn put(path: &Path, text: &[u8]) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = System.open(folder)?;
     let name = path.file_name().unwrap_or_default();
-    disk::replace_with(&folder, &folder, name, |file| file.append(text).and_then(|()| file.set_mode(FOR_ALL)))
+    disk::replace_with(&folder, &folder, name, |file| {
+        file.append(text)?;
+        file.set_mode(FOR_ALL)
+    })
 }
 
 /// Whether what is counted only grows.
@@ -104,7 +109,9 @@ impl Page {
         values: &[(&str, f64)],
     ) -> prometheus::Result<()> {
         let options = Opts::new(name, help).namespace("planish");
-        let (counters, gauges) = (CounterVec::new(options.clone(), label)?, GaugeVec::new(options, label)?);
+        // One of the two is filled and registered, the other is dropped.
+        let counters = CounterVec::new(options.clone(), label)?;
+        let gauges = GaugeVec::new(options, label)?;
         for (value_of_label, value) in values {
             let labels = if label.is_empty() { &[][..] } else { &[*value_of_label][..] };
             match kind {

@@ -40,6 +40,20 @@ impl Pulse {
 
     /// Takes in what is seen `now`; whether the work moves, or has moved a moment ago. Whether threads wait for a disk is
     /// only asked where nothing else moves.
+    ///
+    /// ```
+    /// use planish::operating::pulse::{Pulse, Vitals};
+    /// use std::time::{Duration, Instant};
+    ///
+    /// let (second, begin) = (Duration::from_secs(1), Instant::now());
+    /// let mut pulse = Pulse::new(60 * second);
+    /// let stands_still = Vitals { at_work: 1, steps: 7, processor: second };
+    /// assert!(pulse.beats(begin, stands_still, || false));
+    /// assert!(pulse.beats(begin + 59 * second, stands_still, || false));
+    /// assert!(!pulse.beats(begin + 60 * second, stands_still, || false));
+    /// // Who waits for a disk is not stuck.
+    /// assert!(pulse.beats(begin + 61 * second, stands_still, || true));
+    /// ```
     pub fn beats(&mut self, now: Instant, seen: Vitals, waits_for_disk: impl FnOnce() -> bool) -> bool {
         let moves = match &self.last {
             None => true,

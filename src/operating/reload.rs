@@ -17,6 +17,21 @@ pub struct Reloaded {
 
 /// Takes up `fresh` settings in the place of those `in_force`, as far as that can be. Whether inputs can go where the
 /// settings say tells `is_possible`.
+///
+/// ```
+/// use planish::operating::reload::take_up;
+/// use planish::settings::{RawSettings, Settings};
+///
+/// let settings = |toml| -> Settings {
+///     let said: RawSettings = toml::from_str(toml).expect("planish.toml");
+///     said.check().expect("in range")
+/// };
+/// let in_force = settings("jobs = 2");
+/// let reloaded = take_up(&in_force, settings("jobs = 2\nweld = 1e-5\nrecursive = true"), |_| true);
+/// assert_eq!(reloaded.settings.weld, 1e-5);
+/// // Which folders are watched is settled at the start.
+/// assert_eq!((reloaded.settings.recursive, reloaded.later), (false, vec!["recursive"]));
+/// ```
 pub fn take_up(in_force: &Settings, fresh: Settings, is_possible: impl Fn(&Settings) -> bool) -> Reloaded {
     let mut later = Vec::new();
     let mut settings = Settings { machine_memory: in_force.machine_memory, ..fresh };

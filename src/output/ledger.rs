@@ -12,26 +12,35 @@ use std::path::{Path, PathBuf};
 use walkdir::{DirEntry, WalkDir};
 
 /// The report published in `folder`, if it is that of this version, of an `input` of the same content with the same
-/// `settings`, and of the files `beside` it, and its files are there, unharmed. A failure is none: another version may do better, or another
-/// day; but planish does not die twice of the same. Nor is a refusal for a limit, which may have been raised since.
+/// `settings`, and of the files `beside` it, and its files are there, unharmed. A failure is none: another version may do
+/// better, or another day; but planish does not die twice of the same. Nor is a refusal for a limit, which may have been
+/// raised since.
 pub fn up_to_date(folder: &Path, input: &Input, settings: &Settings, beside: &Siblings) -> Option<Report> {
     up_to_date_in(&System.open(folder).ok()?, input, settings, beside)
 }
 
 /// As [`up_to_date`], in an open folder.
 pub fn up_to_date_in<F: Folder>(folder: &F, input: &Input, settings: &Settings, beside: &Siblings) -> Option<Report> {
-    let text = folder.follow_file(result_files::REPORT).and_then(|file| safe_open::read(&file, u64::MAX));
-    let older: Report = serde_json::from_slice(&text.ok()?).ok()?;
-    let same = Input { beside: vec![], ..older.input.clone() } == *input
+    let file = folder.follow_file(result_files::REPORT).ok()?;
+    let text = safe_open::read(&file, u64::MAX).ok()?;
+    let older: Report = serde_json::from_slice(&text).ok()?;
+    let is_of_same_input = is_of(&older, input, beside);
+    let is_of_same_settings = older.settings == settings.into();
+    let is_of_this_version = (older.schema, older.planish.as_str()) == (SCHEMA, VERSION);
+    // What is certified has files beside its report, and nothing else has.
+    let is_complete = (older.status == Status::Certified) != older.outputs.is_empty();
+    let may_stand = is_of_same_input && is_of_same_settings && is_of_this_version && is_final(&older) && is_complete;
+    // Last, as all files are read for it.
+    let is_unharmed = may_stand && older.outputs.iter().all(|output| holds_in(folder, output).unwrap_or(false));
+    is_unharmed.then_some(older)
+}
+
+/// Whether a report is of an input of this known content, and of the files that lie beside it now.
+fn is_of(older: &Report, input: &Input, beside: &Siblings) -> bool {
+    // The same content names the same files beside it: what it named then is compared with what they are now.
+    Input { beside: vec![], ..older.input.clone() } == *input
         && input.blake3.is_some()
-        // The same content names the same files beside it.
         && older.input.beside.iter().all(|read| beside.still_has(read))
-        && older.settings == settings.into()
-        && (older.schema, older.planish.as_str()) == (SCHEMA, VERSION)
-        && is_final(&older);
-    let there = |o: &Output| holds_in(folder, o).is_ok_and(|it_does| it_does);
-    let complete = (older.status == Status::Certified) != older.outputs.is_empty();
-    (same && complete && older.outputs.iter().all(there)).then_some(older)
 }
 
 /// Whether doing the same input again would be in vain, as far as is known.
@@ -83,6 +92,7 @@ pub fn entries(out: &Path) -> impl Iterator<Item = (PathBuf, Entry)> {
     std::iter::from_fn(move || {
         // Ends where the folder does.
         loop {
+            // What cannot be looked at is passed over.
             let Ok(found) = folders.next()? else { continue };
             if is_hidden(&found) && found.file_type().is_dir() {
                 folders.skip_current_dir();

@@ -40,8 +40,10 @@ pub fn own_files<F: Folder>(folder: &F) -> io::Result<Option<BTreeSet<OsString>>
         text => text.ok(),
     };
     let report: Option<Known> = text.and_then(|text| serde_json::from_slice(&text).ok());
-    let beside = result_files::BESIDE_OUTPUTS.map(str::to_owned);
-    Ok(report.map(|r| r.outputs.into_iter().map(|o| o.file).chain(beside).map(OsString::from).collect()))
+    let Some(report) = report else { return Ok(None) };
+    let mut own: BTreeSet<OsString> = report.outputs.into_iter().map(|output| output.file.into()).collect();
+    own.extend(result_files::BESIDE_OUTPUTS.map(OsString::from));
+    Ok(Some(own))
 }
 
 /// Why what is not planish's cannot be kept.
@@ -102,8 +104,9 @@ fn keep<F: Folder>(older: &F, at: &Path, name: &OsStr, (fresh, desk): (&F, &F), 
     };
     let mut kept = usize::from(is_new);
     if found.is_folder() {
-        let [from, to] = [older.open_folder(name), fresh.open_folder(name)];
-        let (from, to) = (from.map_err(failed)?, to.map_err(failed)?);
+        let from = older.open_folder(name).map_err(failed)?;
+        let to = fresh.open_folder(name).map_err(failed)?;
+        // Nothing in there is planish's.
         let inside = keep_foreign(&from, &path, &BTreeSet::new(), (&to, desk), again)?;
         let is_complete = to.stat().map_err(failed)?.mode == found.mode_of_copy();
         if is_new || inside > 0 || !is_complete {
@@ -117,15 +120,19 @@ fn keep<F: Folder>(older: &F, at: &Path, name: &OsStr, (fresh, desk): (&F, &F), 
 /// Whether what has this name in `fresh` is what is kept there of the one that was `found` in `older`.
 fn is_second<F: Folder>(older: &F, name: &OsStr, found: &Stat, fresh: &F) -> io::Result<bool> {
     let second = fresh.stat_of(name)?;
-    Ok(found.kind == second.kind
-        && match found.kind {
-            Kind::Folder => true,
-            Kind::Link => older.read_link(name)? == fresh.read_link(name)?,
+    if found.kind != second.kind {
+        return Ok(false);
+    }
+    match found.kind {
+        Kind::Folder => Ok(true),
+        Kind::Link => Ok(older.read_link(name)? == fresh.read_link(name)?),
+        Kind::File | Kind::Other => {
+            let is_same = found.identity == second.identity;
             // Copies have another number, and size and time of their original.
-            Kind::File | Kind::Other => {
-                found.identity == second.identity || (found.bytes, found.modified) == (second.bytes, second.modified)
-            }
-        })
+            let is_copy = (found.bytes, found.modified) == (second.bytes, second.modified);
+            Ok(is_same || is_copy)
+        }
+    }
 }
 
 /// Gives a folder the permissions of the one that it was made after, and brings it to disk.
@@ -134,6 +141,7 @@ fn complete<F: Folder>(from: &Stat, to: &F) -> io::Result<()> {
     to.sync()
 }
 
+/// Gives a file a second name in another folder, or makes a copy of it there.
 fn second_name<F: Folder>(from: &F, name: &OsStr, to: &F, desk: &F) -> io::Result<()> {
     match from.link(name, to, name) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => copy(from, name, to, desk),
@@ -141,6 +149,7 @@ fn second_name<F: Folder>(from: &F, name: &OsStr, to: &F, desk: &F) -> io::Resul
     }
 }
 
+/// Copies a file: on the desk, and into place when it is whole.
 fn copy<F: Folder>(from: &F, name: &OsStr, to: &F, desk: &F) -> io::Result<()> {
     let file = from.open_file(name).map_err(OpenError::into_io)?;
     let (hidden, copy) = disk::make_unique("copy-", |hidden| desk.make_file(hidden, 0o600))?;
@@ -151,6 +160,7 @@ fn copy<F: Folder>(from: &F, name: &OsStr, to: &F, desk: &F) -> io::Result<()> {
     filled
 }
 
+/// Writes to a copy what is in the file, with its time and permissions, and brings it to disk.
 fn fill<F: File>(file: &F, copy: &F) -> io::Result<()> {
     let original = file.stat()?;
     io::copy(&mut file.content()?, &mut Appending(copy))?;

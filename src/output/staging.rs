@@ -31,14 +31,27 @@ pub(crate) const RUN: &str = "run-";
 /// The file whose lock a process holds while it makes its staging folder, or puts a result in place.
 pub(crate) const GATE: &str = "opening";
 
+/// The result, as long as it is written.
 const HALF: &str = "half";
+
+/// The complete result; after an exchange, the older one.
 const WHOLE: &str = "whole";
+
+/// The older result, where two folders cannot be exchanged.
 const OLDER: &str = "older";
+
+/// The newer result, where the older one came back in two steps: nobody wants it.
 const WITHDRAWN: &str = "withdrawn";
+
+/// The link that tells which result is made here.
 const PLACE: &str = "place";
 
-/// How often the lock of an output folder is looked for that was removed while somebody waited for it.
+/// How often the lock of an output folder is looked for that was removed while somebody waited for it. Each time
+/// somebody must have removed it just then; after so many, they do it all the time, and it is told.
 const GATES: usize = 8;
+
+/// How often a result is put in its place while others put something there, or take it away, at the same time.
+const EXCHANGES: usize = 16;
 
 /// Nobody else has anything to do in a staging folder.
 const PRIVATE_FOLDER: u32 = 0o700;
@@ -331,6 +344,7 @@ impl<F: Folder> Desk<F> {
             Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::InvalidInput) => return Ok(None),
             text => PathBuf::from(text?),
         };
+        // As `complete` writes it: the number of the folder, then the name of the result.
         let mut parts = text.components();
         let number = parts.next().and_then(|part| part.as_os_str().to_str()?.parse().ok());
         let name = parts.as_path().to_owned();
@@ -344,7 +358,7 @@ impl<F: Folder> Desk<F> {
     /// # Errors
     /// Those of the system; [`Self::settle`] tells what came of it.
     pub fn put_in_place(&self, folder: &F, name: &OsStr) -> io::Result<()> {
-        for _ in 0..16 {
+        for _ in 0..EXCHANGES {
             match self.folder.rename(WHOLE, folder, name, Rename::ToFree) {
                 Err(error) if disk::is_unsupported(&error) => break,
                 Err(error) if is_taken(&error) => {}
@@ -383,6 +397,7 @@ impl<F: Folder> Desk<F> {
     ) -> Result<Settled, PublishError> {
         let above = promise.name.parent().unwrap_or(Path::new(""));
         let mut settled = Settled::Newer;
+        // Either may hold an older result: which, tells whether the file system could exchange the two.
         for aside in [OLDER, WHOLE] {
             if self.holds_older(aside, promise).map_err(at(&out.join(&promise.name)))? {
                 let folder = disk::make_all(disk, &out.join(above)).map_err(at(&out.join(above)))?;
@@ -394,6 +409,7 @@ impl<F: Folder> Desk<F> {
             Err((_, error)) if error.kind() == ErrorKind::NotFound => {}
             synced => synced.map_err(|(path, error)| at(&path)(error))?,
         }
+        // Last: as long as the link is there, the next start settles all this again.
         let is_settled = self.folder.unlink(PLACE);
         is_settled.map_err(at(&out.join(&promise.name)))?;
         Ok(settled)

@@ -56,6 +56,19 @@ pub enum HookRefused {
 impl Hook {
     /// Checks a command for this occasion.
     ///
+    /// ```
+    /// use planish::settings::{Hook, HookRefused, Occasion, RawCommand};
+    ///
+    /// let hook = |program: &str, time_limit: f64| {
+    ///     let command = vec![program.to_owned(), "{remesh}".to_owned(), "-2".to_owned()];
+    ///     Hook::new(RawCommand { command, time_limit }, Occasion::Certified)
+    /// };
+    /// assert!(hook("gmsh", 600.0).is_ok());
+    /// assert_eq!(hook("gmsh", 0.0), Err(HookRefused::TimeLimit(0.0)));
+    /// // Relative to which folder?
+    /// assert_eq!(hook("bin/gmsh", 600.0), Err(HookRefused::RelativeProgram("bin/gmsh".to_owned())));
+    /// ```
+    ///
     /// # Errors
     /// [`HookRefused`] for what can never run.
     pub fn new(configured: RawCommand, occasion: Occasion) -> Result<Self, HookRefused> {
@@ -63,11 +76,12 @@ impl Hook {
         if !(*time_limit > 0.0 && time_limit.is_finite()) {
             return Err(HookRefused::TimeLimit(*time_limit));
         }
-        let parse = |(i, text): (usize, &String)| {
+        let mut arguments = Vec::new();
+        for (i, text) in command.iter().enumerate() {
+            let argument = Template::parse(text, occasion);
             let refused = |error| HookRefused::Argument { part: i + 1, text: text.clone(), error };
-            Template::parse(text, occasion).map_err(refused)
-        };
-        let arguments = command.iter().enumerate().map(parse).collect::<Result<Vec<_>, _>>()?;
+            arguments.push(argument.map_err(refused)?);
+        }
         match arguments.first() {
             Some(program) if program.is_relative_path() => Err(HookRefused::RelativeProgram(command[0].clone())),
             Some(program) if !program.is_empty() => Ok(Self { configured, arguments }),

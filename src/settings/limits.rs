@@ -35,6 +35,15 @@ const SMALL: u64 = 1 << 20;
 
 impl Limits {
     /// How many bytes may come out of a file of this size.
+    ///
+    /// ```
+    /// use planish::settings::Limits;
+    ///
+    /// let limits = Limits { expansion: 100, ..Limits::default() };
+    /// assert_eq!(limits.unpacked(10 << 20), 1000 << 20);
+    /// // Files below 1 MiB may become as much as one of 1 MiB.
+    /// assert_eq!(limits.unpacked(300), 100 << 20);
+    /// ```
     pub fn unpacked(&self, file: usize) -> u64 {
         SMALL.max(file as u64).saturating_mul(self.expansion)
     }

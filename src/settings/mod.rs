@@ -252,7 +252,7 @@ const USUAL_COMMANDS: usize = 4;
 /// Less memory than this is a slip of the finger.
 const LEAST_MEMORY: ByteSize = ByteSize::mib(16);
 
-/// The stacks and buffers of an idle process take half of this.
+/// Less memory for an input than this is too little for any: the stacks and buffers of an idle process take half of it.
 const LEAST_JOB_MEMORY: ByteSize = ByteSize::mib(64);
 
 /// Room that is left on the disk of the results, where nothing is said: enough to tell what is wrong.
@@ -278,6 +278,16 @@ impl RawSettings {
     }
 
     /// What was said here, and where nothing was said, what was said in `other`.
+    ///
+    /// ```
+    /// use planish::settings::{FeatureAngle, Off, RawSettings};
+    ///
+    /// let file: RawSettings = toml::from_str("jobs = 2\nfeature-angle = \"off\"").expect("planish.toml");
+    /// let command_line = RawSettings { jobs: Some(8), ..RawSettings::default() };
+    /// let said = command_line.or(file);
+    /// assert_eq!(said.jobs, Some(8));
+    /// assert_eq!(said.feature_angle, Some(FeatureAngle::Off(Off::Off)));
+    /// ```
     pub fn or(self, other: Self) -> Self {
         Self {
             out: self.out.or(other.out),
@@ -314,6 +324,20 @@ impl RawSettings {
 
     /// Checks everything and fills in the defaults.
     ///
+    /// ```
+    /// use planish::settings::RawSettings;
+    ///
+    /// // Sizes: G is 10^9 bytes, Gi is 2^30.
+    /// let said: RawSettings = toml::from_str("memory = \"2 GiB\"\njob-memory = \"1 GB\"").expect("planish.toml");
+    /// let settings = said.check().expect("in range");
+    /// assert_eq!((settings.memory, settings.job_memory), (2 << 30, Some(1_000_000_000)));
+    /// assert_eq!((settings.job_time, settings.feature_angle), (None, Some(40.0)));
+    ///
+    /// let said = RawSettings { weld: Some(0.1), ..RawSettings::default() };
+    /// let message = said.check().unwrap_err().to_string();
+    /// assert!(message.starts_with("weld is 0.1; it must lie between 0"));
+    /// ```
+    ///
     /// # Errors
     /// [`SettingsError`] for values out of range.
     pub fn check(self) -> Result<Settings, SettingsError> {
@@ -324,6 +348,7 @@ impl RawSettings {
             other => return Err(SettingsError::Order(other)),
         };
         let weld = self.weld.unwrap_or(planish_core::repair::Settings::default().weld);
+        // A range holds no number that is none: NaN is refused here, and below.
         if !(0.0..=0.01).contains(&weld) {
             return Err(SettingsError::Weld(weld));
         }
@@ -348,11 +373,13 @@ impl RawSettings {
         if !(1..=MOST_JOBS).contains(&jobs) {
             return Err(SettingsError::Jobs(jobs));
         }
+        // With as many as there are computations, one or two that hang would hold up all others.
         let commands = self.commands.unwrap_or_else(|| USUAL_COMMANDS.max(2 * jobs));
         if !(1..=MOST_COMMANDS).contains(&commands) {
             return Err(SettingsError::Commands(commands));
         }
         let machine_memory = machine::memory();
+        // Half of it, as what an input takes is foretold: the rest is for what was foretold too low, and for all else.
         let memory = self.memory.unwrap_or_else(|| ByteSize::b(machine_memory / 2).max(LEAST_MEMORY));
         if memory < LEAST_MEMORY {
             return Err(SettingsError::Memory(memory));
@@ -400,6 +427,7 @@ impl RawSettings {
     }
 }
 
+/// The time of so many days.
 fn kept_for(days: f64) -> Result<Duration, SettingsError> {
     if days > 0.0 && days <= MOST_DAYS {
         Ok(Duration::from_secs_f64(days * 86_400.0))
@@ -408,11 +436,14 @@ fn kept_for(days: f64) -> Result<Duration, SettingsError> {
     }
 }
 
+/// The commands for an occasion, checked in their order.
 fn hooks(said: Option<Vec<RawCommand>>, occasion: Occasion) -> Result<Vec<Hook>, SettingsError> {
-    let check = |(i, command)| {
-        Hook::new(command, occasion).map_err(|error| SettingsError::Command { occasion, table: i + 1, error })
-    };
-    said.unwrap_or_default().into_iter().enumerate().map(check).collect()
+    let mut hooks = Vec::new();
+    for (i, command) in said.unwrap_or_default().into_iter().enumerate() {
+        let hook = Hook::new(command, occasion);
+        hooks.push(hook.map_err(|error| SettingsError::Command { occasion, table: i + 1, error })?);
+    }
+    Ok(hooks)
 }
 
 #[cfg(test)]

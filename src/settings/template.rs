@@ -101,6 +101,20 @@ pub struct Template(Vec<Part>);
 impl Template {
     /// Reads an argument as it stands in planish.toml.
     ///
+    /// ```
+    /// use planish::settings::{Occasion, Part, Placeholder, Template, TemplateError};
+    ///
+    /// let argument = Template::parse("-o={folder}/{{1}}.msh", Occasion::Certified).expect("a placeholder that is there");
+    /// let [before, behind] = ["-o=", "/{1}.msh"].map(|text| Part::Text(text.to_owned()));
+    /// assert_eq!(argument.parts(), [before, Part::Placeholder(Placeholder::Folder), behind]);
+    ///
+    /// let error = |text| Template::parse(text, Occasion::Certified).unwrap_err();
+    /// assert_eq!(error("{size}"), TemplateError::Unknown("size".to_owned(), Occasion::Certified));
+    /// // What is certified has no code of a refusal.
+    /// assert_eq!(error("{code}"), TemplateError::Missing("code".to_owned(), Occasion::Certified));
+    /// assert_eq!(error("a{folder"), TemplateError::Unbalanced(2));
+    /// ```
+    ///
     /// # Errors
     /// [`TemplateError`] for what is no placeholder.
     pub fn parse(said: &str, occasion: Occasion) -> Result<Self, TemplateError> {
@@ -116,12 +130,14 @@ impl Template {
                 rest = after;
                 continue;
             }
+            // The place of the brace, in characters from 1.
             let unbalanced = || TemplateError::Unbalanced(said[..said.len() - brace.len()].chars().count() + 1);
             let (name, after) = brace.strip_prefix('{').and_then(|b| b.split_once('}')).ok_or_else(unbalanced)?;
             if name.contains('{') {
                 return Err(unbalanced());
             }
-            parts.extend([Part::Text(std::mem::take(&mut text)), Part::Placeholder(placeholder(name, occasion)?)]);
+            parts.push(Part::Text(std::mem::take(&mut text)));
+            parts.push(Part::Placeholder(placeholder(name, occasion)?));
             rest = after;
         }
         parts.push(Part::Text(text + rest));
@@ -141,9 +157,12 @@ impl Template {
             Some(Part::Placeholder(place)) => !place.is_path(),
             None => false,
         };
-        let separated = |p: &Part| matches!(p, Part::Text(t) if t.contains(std::path::is_separator));
-        let whole_path = |p: &Part| matches!(p, Part::Placeholder(place) if place.is_path());
-        begins_elsewhere && self.0.iter().any(|p| separated(p) || whole_path(p))
+        // A name alone is looked for on the PATH: no path is relative to any folder without a separator.
+        let has_separator = self.0.iter().any(|part| match part {
+            Part::Text(text) => text.contains(std::path::is_separator),
+            Part::Placeholder(placeholder) => placeholder.is_path(),
+        });
+        begins_elsewhere && has_separator
     }
 
     /// Its parts, in their order.

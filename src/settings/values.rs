@@ -63,6 +63,16 @@ impl std::str::FromStr for FeatureAngle {
 }
 
 /// What becomes of inputs of `planish watch` that are certified, and on which all commands succeeded.
+///
+/// ```
+/// use planish::settings::{Inputs, Refused};
+///
+/// assert_eq!("move:done".parse(), Ok(Inputs::Move("done".into())));
+/// assert_eq!("move:".parse::<Inputs>(), Err("move: is none of keep, move:DIR and delete".to_owned()));
+/// // What is refused may be moved, but is never deleted.
+/// assert!("move:refused".parse::<Refused>().is_ok());
+/// assert!("delete".parse::<Refused>().is_err());
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, Default, Deserialize)]
 #[serde(try_from = "String")]
 pub enum Inputs {

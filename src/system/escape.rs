@@ -8,12 +8,25 @@ use std::path::Path;
 const LONGEST: usize = 2000;
 
 /// A path, on one line and never that of another file: bytes that are no UTF-8 are told as `\xff`.
+///
+/// ```
+/// use planish::system::escape::escape;
+///
+/// assert_eq!(escape("parts/wing 3's.stl".as_ref()), "parts/wing 3's.stl");
+/// // One line stays one line, and a terminal is not steered.
+/// assert_eq!(escape("a\nb.stl".as_ref()), r"a\nb.stl");
+/// assert_eq!(escape("\x1b[31m.stl".as_ref()), r"\u{1b}[31m.stl");
+/// // Never the name of another file: this one has a backslash and the letter n.
+/// assert_eq!(escape(r"a\nb.stl".as_ref()), r"a\\nb.stl");
+/// ```
 pub fn escape(path: &Path) -> String {
     let mut told = String::new();
     for chunk in path.as_os_str().as_encoded_bytes().utf8_chunks() {
         told += &escaped(chunk.valid(), &['\'', '"']);
-        // Writing to a string cannot fail.
-        chunk.invalid().iter().for_each(|byte| _ = write!(told, "\\x{byte:02x}"));
+        for byte in chunk.invalid() {
+            // Writing to a string cannot fail.
+            let _ = write!(told, "\\x{byte:02x}");
+        }
     }
     told
 }
@@ -27,20 +40,44 @@ pub fn printable(message: &str) -> String {
 
 /// A text of several lines.
 pub fn printable_lines(text: &str) -> String {
-    text.split('\n').map(|line| escaped(line, &PLAIN)).collect::<Vec<_>>().join("\n")
+    let lines: Vec<String> = text.split('\n').map(|line| escaped(line, &PLAIN)).collect();
+    lines.join("\n")
 }
 
 /// JSON that says the same, without characters that are not to be seen. These can stand in its strings only.
+///
+/// ```
+/// use planish::system::escape::printable_json;
+///
+/// // U+202E would turn the direction of writing: "gpj.stl" would be shown as "lts.jpg".
+/// let json = "{\"name\": \"\u{202e}gpj.stl\"}";
+/// assert_eq!(printable_json(json), r#"{"name": "\u202egpj.stl"}"#);
+/// ```
 pub fn printable_json(json: &str) -> String {
     let mut told = String::with_capacity(json.len());
     for c in json.chars() {
-        if c == '\n' || c.is_ascii_graphic() || escaped(c.encode_utf8(&mut [0; 4]), &PLAIN).len() == c.len_utf8() {
+        if is_seen(c) {
             told.push(c);
-        } else {
-            c.encode_utf16(&mut [0; 2]).iter().for_each(|unit| _ = write!(told, "\\u{unit:04x}"));
+            continue;
+        }
+        // JSON escapes units of UTF-16: characters above U+FFFF take two.
+        for unit in c.encode_utf16(&mut [0; 2]) {
+            let _ = write!(told, "\\u{unit:04x}");
         }
     }
     told
+}
+
+/// Whether a character may stand in JSON that is shown: it ends no line within a string, and needs no escape.
+fn is_seen(c: char) -> bool {
+    // The common ones, quickly. Line feeds stand between values only: in strings JSON has escaped them.
+    if c == '\n' || c.is_ascii_graphic() {
+        return true;
+    }
+    let mut buffer = [0; 4];
+    let character = c.encode_utf8(&mut buffer);
+    // An escape is longer than what it stands for.
+    escaped(character, &PLAIN).len() == character.len()
 }
 
 /// What the standard library escapes although it can be seen. Messages quote what is escaped already.
@@ -48,12 +85,15 @@ const PLAIN: [char; 3] = ['\'', '"', '\\'];
 
 /// A text with escapes for all that is not to be seen, and for quotes and backslashes but the `plain` ones.
 fn escaped(text: &str, plain: &[char]) -> String {
-    let piece = |piece: &str| {
+    let mut told = String::with_capacity(text.len());
+    // Each piece ends with a plain character, but for the last one, which need not.
+    for piece in text.split_inclusive(plain) {
         let kept = piece.chars().next_back().filter(|c| plain.contains(c));
         let others = &piece[..piece.len() - kept.map_or(0, char::len_utf8)];
-        others.escape_debug().chain(kept).collect::<String>()
-    };
-    text.split_inclusive(plain).map(piece).collect()
+        told.extend(others.escape_debug());
+        told.extend(kept);
+    }
+    told
 }
 
 #[cfg(test)]

@@ -83,6 +83,22 @@ impl Fingerprint {
     }
 
     /// Whether this is the same file with the same content, perhaps under another name: a rename changes nothing else.
+    ///
+    /// ```
+    /// use planish::system::fingerprint::Fingerprint;
+    ///
+    /// # fn main() -> std::io::Result<()> {
+    /// let folder = tempfile::tempdir()?;
+    /// let (old, new) = (folder.path().join("a.stl"), folder.path().join("b.stl"));
+    /// std::fs::write(&old, "solid")?;
+    /// let before = Fingerprint::at(&old)?.expect("a regular file");
+    /// std::fs::rename(&old, &new)?;
+    /// assert!(before.is_renamed(&Fingerprint::at(&new)?.expect("a regular file")));
+    /// std::fs::write(&new, "solid cube")?;
+    /// assert!(!before.is_renamed(&Fingerprint::at(&new)?.expect("a regular file")));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn is_renamed(&self, other: &Self) -> bool {
         (self.bytes, self.identity, self.times[0]) == (other.bytes, other.identity, other.times[0])
     }

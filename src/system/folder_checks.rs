@@ -44,14 +44,14 @@ pub enum FolderError {
 /// # Errors
 /// [`FolderError`].
 pub fn refuse_nested(places: &[FolderRole]) -> Result<(), FolderError> {
-    let resolve = |p: &FolderRole| {
-        let resolved = resolved(p.path);
-        resolved.map_err(|error| FolderError::Unknown { role: p.role, path: p.path.to_owned(), error })
-    };
-    let resolved = places.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
-    for (i, a) in resolved.iter().enumerate() {
-        for (j, b) in resolved.iter().enumerate() {
-            if i != j && a.starts_with(b) {
+    let mut paths = Vec::new();
+    for FolderRole { role, path } in places.iter().copied() {
+        let real = resolved(path).map_err(|error| FolderError::Unknown { role, path: path.to_owned(), error })?;
+        paths.push(real);
+    }
+    for (i, inner) in paths.iter().enumerate() {
+        for (j, outer) in paths.iter().enumerate() {
+            if i != j && inner.starts_with(outer) {
                 let [inner, outer] = [i, j].map(|k| (places[k].role, places[k].path.to_owned()));
                 return Err(FolderError::Nested(inner, outer));
             }

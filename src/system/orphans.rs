@@ -98,9 +98,16 @@ mod linux {
     /// All that can be found.
     fn all_of(staging: &Path) -> Vec<Orphan> {
         let Ok(processes) = fs::read_dir("/proc") else { return Vec::new() };
-        let names = processes.flatten().map(|entry| entry.file_name());
-        let numbers = names.filter_map(|name| name.to_str()?.parse().ok());
-        numbers.filter_map(Pid::from_raw).filter(|id| is_of(*id, staging)).filter_map(handle).collect()
+        let mut orphans = Vec::new();
+        for process in processes.flatten() {
+            // Other names in there are no processes.
+            let number = process.file_name().to_str().and_then(|name| name.parse().ok());
+            let Some(id) = number.and_then(Pid::from_raw) else { continue };
+            if is_of(id, staging) {
+                orphans.extend(handle(id));
+            }
+        }
+        orphans
     }
 
     /// None where the process has ended since.
@@ -124,10 +131,17 @@ mod linux {
     fn is_of(id: Pid, staging: &Path) -> bool {
         let folder = Path::new("/proc").join(id.as_raw_nonzero().to_string());
         let is_ours = id != getpid() && fs::metadata(&folder).is_ok_and(|m| m.uid() == geteuid().as_raw());
-        let Some(environment) = fs::read(folder.join("environ")).ok().filter(|_| is_ours) else { return false };
-        let value = |name| value(&environment, name);
-        value(STAGING) == Some(staging.as_os_str().as_bytes())
-            && value(SESSION).is_some_and(|marked| session(&folder).is_some_and(|now| marked == now.as_bytes()))
+        if !is_ours {
+            return false;
+        }
+        let Ok(environment) = fs::read(folder.join("environ")) else { return false };
+        if value(&environment, STAGING) != Some(staging.as_os_str().as_bytes()) {
+            return false;
+        }
+        match (value(&environment, SESSION), session(&folder)) {
+            (Some(marked), Some(now)) => marked == now.as_bytes(),
+            _ => false,
+        }
     }
 
     /// The value of a variable.

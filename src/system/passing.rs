@@ -44,6 +44,19 @@ const LASTING: [Errno; 7] =
     [Errno::XDEV, Errno::NOTDIR, Errno::ISDIR, Errno::NAMETOOLONG, Errno::LOOP, Errno::FBIG, Errno::OPNOTSUPP];
 
 /// Whether an error says something about the state of the machine only, and not about the file.
+///
+/// ```
+/// use planish::system::passing::{lasts, passes};
+/// use std::io::Error;
+///
+/// let no_space = Error::from(rustix::io::Errno::NOSPC);
+/// assert!(passes(&no_space) && !lasts(&no_space));
+/// let too_long = Error::from(rustix::io::Errno::NAMETOOLONG);
+/// assert!(!passes(&too_long) && lasts(&too_long));
+/// // Neither: somebody may mend permissions at any moment, and nothing tells that they did.
+/// let denied = Error::from(rustix::io::Errno::ACCESS);
+/// assert!(!passes(&denied) && !lasts(&denied));
+/// ```
 pub fn passes(error: &io::Error) -> bool {
     is_of(error, &PASSING) || error.kind() == io::ErrorKind::OutOfMemory
 }
@@ -59,6 +72,13 @@ fn is_of(error: &io::Error, errors: &[Errno]) -> bool {
 }
 
 /// How long to wait after so many failures in a row; 1 is the first.
+///
+/// ```
+/// use planish::system::passing::pause;
+///
+/// let seconds = [1, 2, 3, 4, 10, 11, 1000].map(|failures| pause(failures).as_secs());
+/// assert_eq!(seconds, [1, 2, 4, 8, 512, 600, 600]);
+/// ```
 pub fn pause(failures: u32) -> Duration {
     FIRST.saturating_mul(1 << failures.saturating_sub(1).min(10)).min(LONGEST)
 }

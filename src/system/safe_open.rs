@@ -71,10 +71,27 @@ pub fn open_itself(path: &Path) -> Result<File, OpenError> {
 
 /// As [`open`], where what the path leads to lies in `folder`, itself or in folders below.
 ///
+/// ```
+/// use planish::system::safe_open::{OpenError, open, open_inside};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let top = tempfile::tempdir()?;
+/// let (inbox, secret) = (top.path().join("inbox"), top.path().join("secret.stl"));
+/// std::fs::create_dir(&inbox)?;
+/// std::fs::write(&secret, "solid")?;
+/// let link = inbox.join("part.stl");
+/// std::os::unix::fs::symlink(&secret, &link)?;
+/// assert!(open(&link).is_ok());
+/// assert!(matches!(open_inside(&inbox, &link), Err(OpenError::LeadsOut(_))));
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// [`OpenError`].
 pub fn open_inside(folder: &Path, path: &Path) -> Result<File, OpenError> {
     let (real, target) = (folder.canonicalize()?, path.canonicalize()?);
+    // Where a link is put on the way after this, it is not followed.
     let name = target.strip_prefix(&real).map_err(|_| OpenError::LeadsOut(folder.to_owned()))?;
     open_below(&real, name)
 }
@@ -112,23 +129,36 @@ pub fn follow_in(folder: impl AsFd, name: impl AsRef<Path>) -> Result<File, Open
     open_at(folder, name.as_ref(), false)
 }
 
+/// Opens a regular file by its name in a folder; `itself`: the name must be no link.
 fn open_at(folder: impl AsFd, name: &Path, itself: bool) -> Result<File, OpenError> {
-    let (look, flags) =
-        if itself { (AtFlags::SYMLINK_NOFOLLOW, FLAGS | OFlags::NOFOLLOW) } else { (AtFlags::empty(), FLAGS) };
-    // Devices may act when they are opened.
+    let mut look = AtFlags::empty();
+    let mut flags = FLAGS;
+    if itself {
+        look |= AtFlags::SYMLINK_NOFOLLOW;
+        flags |= OFlags::NOFOLLOW;
+    }
+    // Devices may act when they are opened: so this comes first.
     let seen = statat(&folder, name, look).map_err(io::Error::from)?;
     if FileType::from_raw_mode(seen.st_mode) != FileType::RegularFile {
         return Err(OpenError::NotRegular);
     }
     let file = File::from(patiently(|| openat(&folder, name, flags, Mode::empty()))?);
+    // Something else may have taken its name in between: what was opened counts.
     if file.metadata()?.is_file() { Ok(file) } else { Err(OpenError::NotRegular) }
 }
 
+/// How often a file that is lent to others is asked for. By experience: five seconds are enough for a client that is there to
+/// give it back; more would hold up a stage for one that is gone.
+const CALLS: u32 = 50;
+
+/// The pause between two of these.
+const BETWEEN_CALLS: Duration = Duration::from_millis(100);
+
 /// File servers lend files to others, and call them back when somebody else opens them.
 fn patiently(open: impl Fn() -> rustix::io::Result<OwnedFd>) -> io::Result<OwnedFd> {
-    for _ in 0..50 {
+    for _ in 0..CALLS {
         match open() {
-            Err(rustix::io::Errno::WOULDBLOCK) => std::thread::sleep(Duration::from_millis(100)),
+            Err(rustix::io::Errno::WOULDBLOCK) => std::thread::sleep(BETWEEN_CALLS),
             opened => return Ok(opened?),
         }
     }
@@ -136,6 +166,20 @@ fn patiently(open: impl Fn() -> rustix::io::Result<OwnedFd>) -> io::Result<Owned
 }
 
 /// The bytes of a file, `most` of them at most; whatever is added meanwhile.
+///
+/// ```
+/// use planish::system::safe_open::{OpenError, open, read};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("part.stl");
+/// std::fs::write(&path, "solid")?;
+/// assert_eq!(read(&open(&path)?, 5)?, b"solid");
+/// assert!(matches!(read(&open(&path)?, 4), Err(OpenError::TooLarge { size: 5, most: 4 })));
+/// assert!(matches!(open(folder.path()), Err(OpenError::NotRegular)));
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
 /// [`OpenError`]. What is too large at first sight is not read.
@@ -147,7 +191,8 @@ pub fn read(file: &impl disk::File, most: u64) -> Result<Vec<u8>, OpenError> {
 
 /// What a JSON file of at most `most` bytes says; none where it is not opened, or says something else.
 pub fn read_json<T: DeserializeOwned>(file: Result<impl disk::File, OpenError>, most: u64) -> Option<T> {
-    serde_json::from_slice(&read(&file.ok()?, most).ok()?).ok()
+    let text = read(&file.ok()?, most).ok()?;
+    serde_json::from_slice(&text).ok()
 }
 
 /// The hash of a file of at most `most` bytes, and how many these are; as [`read`], but nothing is kept.
@@ -171,6 +216,7 @@ pub fn read_into(file: &impl disk::File, most: u64, bytes: &mut Vec<u8>) -> Resu
     let size = file.stat()?.bytes;
     refuse_large(size, most)?;
     bytes.try_reserve_exact(usize::try_from(size).unwrap_or(usize::MAX)).map_err(io::Error::other)?;
+    // One byte more than may be shows that it has grown too large since.
     file.content()?.take(most.saturating_add(1)).read_to_end(bytes)?;
     refuse_large(bytes.len() as u64, most)
 }

@@ -15,9 +15,14 @@ const STATE: usize = 0;
 
 /// The processor time of this process and its children since the start, also of those that have ended.
 pub fn processor() -> Duration {
-    let children = children().into_iter().map(|id| format!("/proc/{id}"));
-    let ticks: u64 = children.chain(["/proc/self".to_owned()]).filter_map(|folder| ticks(folder.as_ref())).sum();
-    Duration::from_secs_f64(ticks as f64 / rustix::param::clock_ticks_per_second().max(1) as f64)
+    let mut all = 0;
+    for child in children() {
+        // One that is gone by now is among those that have ended, which are counted below.
+        all += ticks(Path::new(&format!("/proc/{child}"))).unwrap_or(0);
+    }
+    all += ticks(Path::new("/proc/self")).unwrap_or(0);
+    let per_second = rustix::param::clock_ticks_per_second().max(1);
+    Duration::from_secs_f64(all as f64 / per_second as f64)
 }
 
 /// The processor time of the thread that asks.
@@ -29,23 +34,43 @@ pub fn processor_of_this_thread() -> Duration {
 /// Whether a thread of this process or of its children sleeps and cannot be woken, as those do that wait for a disk or
 /// for a file server.
 pub fn waits_for_disk() -> bool {
-    let children = children().into_iter().map(|id| format!("/proc/{id}/task"));
-    children.chain(["/proc/self/task".to_owned()]).any(|tasks| {
-        let tasks = fs::read_dir(tasks).into_iter().flatten().flatten();
-        tasks.filter_map(|task| fields(&task.path())).any(|fields| fields.get(STATE).is_some_and(|state| state == "D"))
-    })
+    let of_children = children().into_iter().any(|child| has_waiting_thread(&format!("/proc/{child}/task")));
+    of_children || has_waiting_thread("/proc/self/task")
+}
+
+/// Whether one of these threads, each of which has a folder in `tasks`, waits for a disk.
+fn has_waiting_thread(tasks: &str) -> bool {
+    // A process may end at any moment, and its folder with it: then nothing waits.
+    let Ok(threads) = fs::read_dir(tasks) else { return false };
+    for thread in threads.flatten() {
+        // D: it sleeps and cannot be woken.
+        if fields(&thread.path()).is_some_and(|fields| fields.get(STATE).is_some_and(|state| state == "D")) {
+            return true;
+        }
+    }
+    false
 }
 
 /// The numbers of the processes that this one has started.
 fn children() -> Vec<u32> {
-    let tasks = fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
-    let listed = tasks.filter_map(|task| fs::read_to_string(task.path().join("children")).ok());
-    let numbers = |list: String| list.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>();
-    listed.flat_map(numbers).collect()
+    let mut children = Vec::new();
+    let Ok(threads) = fs::read_dir("/proc/self/task") else { return children };
+    // Each thread tells of those that it has started itself.
+    for thread in threads.flatten() {
+        let Ok(list) = fs::read_to_string(thread.path().join("children")) else { continue };
+        children.extend(list.split_whitespace().filter_map(|id| id.parse::<u32>().ok()));
+    }
+    children
 }
 
+/// The processor time of a process and of its children that have ended, in ticks of the clock.
 fn ticks(process: &Path) -> Option<u64> {
-    fields(process)?.get(TIMES)?.iter().map(|ticks| ticks.parse::<u64>().ok()).sum()
+    let fields = fields(process)?;
+    let mut sum = 0;
+    for ticks in fields.get(TIMES)? {
+        sum += ticks.parse::<u64>().ok()?;
+    }
+    Some(sum)
 }
 
 /// What the system tells of a process or thread, behind its name, in which there may be anything.

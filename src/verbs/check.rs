@@ -10,12 +10,13 @@ use crate::formats::vtu::{self, Grid};
 use crate::input::read_file;
 use crate::outcome::{Reason, Status};
 use crate::output::ledger;
-use crate::report::{self, ChartReport, Report, certificate, chart_checksum};
+use crate::report::{self, ChartReport, Output, Report, certificate, chart_checksum};
 use crate::result_files;
 use crate::settings::ExportTarget;
 use crate::stages::guard;
 use planish_core::certify::{self, PlanarMap, prove};
 use planish_core::grid::GridPoint;
+use planish_core::measure::distortion::CellFields;
 use std::path::{Path, PathBuf};
 
 /// The files that every certified result has.
@@ -23,6 +24,9 @@ const REQUIRED: [&str; 4] = [result_files::SURFACE, result_files::PARAM, result_
 
 /// The files of a hand-off to Gmsh.
 const HANDED_OFF: [&str; 2] = [result_files::ATLAS_MSH, result_files::REMESH];
+
+/// Triangles of a chart that are named, at most: they stand in one line.
+const NAMED: usize = 16;
 
 /// What can be wrong with a result.
 #[derive(Debug, thiserror::Error)]
@@ -48,20 +52,21 @@ struct Findings {
     wrong: Vec<Finding>,
 }
 
+impl Findings {
+    /// Nothing proven, and one thing wrong.
+    fn only(finding: Finding) -> Self {
+        Self { proven: Vec::new(), wrong: vec![finding] }
+    }
+}
+
 /// Proves all results again; prints one line per chart.
 pub fn check(results: &[PathBuf], quiet: bool) -> Exit {
     let mut exit = Exit::Success;
     for path in results {
         let name = escape(path);
         let found = match folder(path) {
-            Some(folder) => guard(|| Ok(check_one(folder))).unwrap_or_else(|broken: Reason| Findings {
-                wrong: vec![file(result_files::REPORT, broken.message)],
-                ..Findings::default()
-            }),
-            None => Findings {
-                wrong: vec![file(&name, "is neither a result folder nor a report.json")],
-                ..Findings::default()
-            },
+            Some(folder) => check_guarded(folder),
+            None => Findings::only(file(&name, "is neither a result folder nor a report.json")),
         };
         if !quiet {
             found.proven.iter().for_each(|line| say(&format!("{name}: {line}")));
@@ -84,15 +89,19 @@ pub(super) fn folder(path: &Path) -> Option<&Path> {
     parent.filter(|_| named)
 }
 
+/// As [`check_one`]; a panic, which a forged file may provoke, is a finding.
+fn check_guarded(folder: &Path) -> Findings {
+    let checked: Result<Findings, Reason> = guard(|| Ok(check_one(folder)));
+    checked.unwrap_or_else(|broken| Findings::only(file(result_files::REPORT, broken.message)))
+}
+
+/// All that can be found out about a result: where a part is wrong, the others are checked all the same.
 fn check_one(folder: &Path) -> Findings {
-    let mut found = Findings::default();
     let report = match read_report(folder) {
         Ok(report) => report,
-        Err(finding) => {
-            found.wrong.push(finding);
-            return found;
-        }
+        Err(finding) => return Findings::only(finding),
     };
+    let mut found = Findings::default();
     found.wrong.extend(check_outputs(folder, &report));
     match read_grid(folder, result_files::SURFACE) {
         Ok(grid) => {
@@ -130,30 +139,43 @@ pub(super) fn read_report(folder: &Path) -> Result<Report, Finding> {
 
 /// Sizes and hashes of all files.
 fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
-    let unlisted = |name: &&&str| !report.outputs.iter().any(|o| o.file == **name);
-    let asked_for = report.settings.hand_off == ExportTarget::Gmsh;
-    let failed = report.hand_off.as_ref().is_some_and(|h| h.failure.is_some());
-    let handed_off = HANDED_OFF.iter().filter(|_| asked_for && !failed);
-    let is_enlarged = report.hand_off.as_ref().is_some_and(|h| h.enlarged != 1.0);
-    let enlarged = [result_files::ENLARGED_MSH];
-    let missing = REQUIRED
-        .iter()
-        .chain(handed_off)
-        .chain(enlarged.iter().filter(|_| is_enlarged))
-        .filter(unlisted)
-        .map(|name| file(name, "is not listed in the report's outputs"));
-    let damaged = report.outputs.iter().filter_map(|output| {
-        // Names come from the report: only plain ones are opened.
-        if Path::new(&output.file).file_name() != Some(output.file.as_ref()) {
-            return Some(file(&output.file, "is no plain file name"));
+    let mut found = Vec::new();
+    for name in expected_files(report) {
+        if !report.outputs.iter().any(|output| output.file == name) {
+            found.push(file(name, "is not listed in the report's outputs"));
         }
-        match ledger::holds(folder, output) {
-            Ok(true) => None,
-            Ok(false) => Some(file(&output.file, "its content is not what was published (size or blake3 differs)")),
-            Err(error) => Some(file(&output.file, format!("cannot read the file: {error}"))),
-        }
-    });
-    missing.chain(damaged).collect()
+    }
+    for output in &report.outputs {
+        found.extend(check_output(folder, output).err());
+    }
+    found
+}
+
+/// The files that a result with this report has.
+fn expected_files(report: &Report) -> Vec<&'static str> {
+    let mut expected = REQUIRED.to_vec();
+    let is_asked_for = report.settings.hand_off == ExportTarget::Gmsh;
+    let has_failed = report.hand_off.as_ref().is_some_and(|hand_off| hand_off.failure.is_some());
+    if is_asked_for && !has_failed {
+        expected.extend(HANDED_OFF);
+    }
+    if report.hand_off.as_ref().is_some_and(|hand_off| hand_off.enlarged != 1.0) {
+        expected.push(result_files::ENLARGED_MSH);
+    }
+    expected
+}
+
+/// Size and hash of one file.
+fn check_output(folder: &Path, output: &Output) -> Result<(), Finding> {
+    // Names come from the report: only plain ones are opened.
+    if Path::new(&output.file).file_name() != Some(output.file.as_ref()) {
+        return Err(file(&output.file, "is no plain file name"));
+    }
+    match ledger::holds(folder, output) {
+        Ok(true) => Ok(()),
+        Ok(false) => Err(file(&output.file, "its content is not what was published (size or blake3 differs)")),
+        Err(error) => Err(file(&output.file, format!("cannot read the file: {error}"))),
+    }
 }
 
 fn read_grid(folder: &Path, name: &str) -> Result<Grid, Finding> {
@@ -186,18 +208,22 @@ fn check_surface(grid: &Grid, report: &Report) -> Vec<Finding> {
     if let Some(point) = grid.points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
         found.push(wrong(format!("point {point} is not finite")));
     }
-    let possible = |f: &planish_core::measure::distortion::CellFields| {
-        f.det_min > 0.0
-            && f.det_min <= f.det_max
-            && (f64::MIN_POSITIVE..=1.0).contains(&f.jacobian_ratio)
-            && (1.0..=f64::MAX).contains(&f.conformal_distortion)
-            && (f64::MIN_POSITIVE..=f64::MAX).contains(&f.area_scale)
-            && f.det_max.is_finite()
-    };
-    if let Some(cell) = grid.fields.iter().position(|f| !possible(f)) {
-        found.push(wrong(format!("the fields of triangle {} cannot be: {:?}", grid.triangle[cell], grid.fields[cell])));
+    if let Some(cell) = grid.fields.iter().position(|fields| !are_possible(fields)) {
+        let (triangle, fields) = (grid.triangle[cell], grid.fields[cell]);
+        found.push(wrong(format!("the fields of triangle {triangle} cannot be: {fields:?}")));
     }
     found
+}
+
+/// Whether the fields of a cell can be those of any valid map. (A ratio and a distortion are bounded by 1, an area scale is
+/// positive; ranges refuse what is not a number, too.)
+fn are_possible(fields: &CellFields) -> bool {
+    fields.det_min > 0.0
+        && fields.det_min <= fields.det_max
+        && (f64::MIN_POSITIVE..=1.0).contains(&fields.jacobian_ratio)
+        && (1.0..=f64::MAX).contains(&fields.conformal_distortion)
+        && (f64::MIN_POSITIVE..=f64::MAX).contains(&fields.area_scale)
+        && fields.det_max.is_finite()
 }
 
 /// Proves one chart; the line that says so.
@@ -231,25 +257,38 @@ fn check_chart(grid: &Grid, index: usize, chart: &ChartReport) -> Result<String,
 
 /// The map of the given cells, with its points numbered from the first one on.
 fn planar_map(grid: &Grid, cells: &[usize], chart: &ChartReport) -> Result<PlanarMap, String> {
-    let nodes = || cells.iter().flat_map(|c| grid.cells[*c]);
+    // planish writes the nodes of one chart after those of the other: what is between the first and the last is its own.
+    let nodes = || cells.iter().flat_map(|cell| grid.cells[*cell]);
     let (Some(first), Some(last)) = (nodes().min(), nodes().max()) else {
         return Err("it has no triangles".to_owned());
     };
-    let exact =
-        |uv: [f64; 2]| GridPoint::exact(uv).ok_or(format!("uv {uv:?} does not lie on the grid of multiples of 2^-53"));
-    let places: Result<Vec<_>, _> = (first..=last).map(|n| exact(grid.uv[n as usize])).collect();
-    let centres: Result<Vec<_>, _> = chart.certificate.hole_centres.iter().map(|c| exact(*c)).collect();
-    let local = |c: &usize| grid.cells[*c].map(|n| n - first);
-    Ok(PlanarMap { cells: cells.iter().map(local).collect(), nodes: places?, hole_centres: centres? })
+    let mut nodes = Vec::new();
+    for node in first..=last {
+        nodes.push(exact(grid.uv[node as usize])?);
+    }
+    let mut hole_centres = Vec::new();
+    for centre in &chart.certificate.hole_centres {
+        hole_centres.push(exact(*centre)?);
+    }
+    let cells = cells.iter().map(|cell| grid.cells[*cell].map(|node| node - first)).collect();
+    Ok(PlanarMap { cells, nodes, hole_centres })
+}
+
+/// A parameter on the grid, on which the proof is exact: planish writes no others.
+fn exact(uv: [f64; 2]) -> Result<GridPoint, String> {
+    GridPoint::exact(uv).ok_or_else(|| format!("uv {uv:?} does not lie on the grid of multiples of 2^-53"))
 }
 
 /// Names triangles by their number in the input.
 fn unproven(grid: &Grid, cells: &[usize], chart: u32, error: certify::Error) -> Finding {
     match error {
         certify::Error::InvalidTriangles { all, .. } => {
-            let id = |f: &planish_core::topology::FaceId| grid.triangle[cells[f.index()]].to_string();
-            let mut triangles = all.iter().take(16).map(id).collect::<Vec<_>>().join(", ");
-            if all.len() > 16 {
+            let mut named = Vec::new();
+            for face in all.iter().take(NAMED) {
+                named.push(grid.triangle[cells[face.index()]].to_string());
+            }
+            let mut triangles = named.join(", ");
+            if all.len() > NAMED {
                 triangles += &format!(", ... ({} in all)", all.len());
             }
             Finding::Triangles { chart, triangles }
@@ -270,12 +309,12 @@ fn check_param(folder: &Path, surface: &Grid, charts: usize) -> Result<(), Findi
     }
     for (cell, chart) in param.cells.iter().zip(&param.chart) {
         let [x, y] = vtu::shift(usize::try_from(*chart).unwrap_or(0), charts);
-        let off = |n: &&u32| {
-            let (p, uv) = (param.points[**n as usize], param.uv[**n as usize]);
-            p != [uv[0] + x, uv[1] + y, 0.0]
-        };
-        if let Some(node) = cell.iter().find(off) {
-            return Err(file(result_files::PARAM, format!("point {node} does not lie at its uv")));
+        for node in cell {
+            let [u, v] = param.uv[*node as usize];
+            // The same sums as when it was written: exactly the same numbers.
+            if param.points[*node as usize] != [u + x, v + y, 0.0] {
+                return Err(file(result_files::PARAM, format!("point {node} does not lie at its uv")));
+            }
         }
     }
     Ok(())

@@ -74,19 +74,10 @@ pub fn check_mesh(
         return Err("--min-gamma must lie between 0 and 1".into());
     }
     let name = escape(&question.mesh);
-    let judged = guard(|| {
-        let folder = folder(result).ok_or("is neither a result folder nor a report.json".to_owned());
-        let folder = folder.map_err(|problem| Unjudged::Told(format!("{} {problem}", escape(result))));
-        Ok::<_, Reason>(folder.and_then(|folder| Ok((folder, judge(folder, question, settings)?))))
-    });
-    let (folder, report) = match judged {
-        Ok(Ok(judged)) => judged,
-        Ok(Err(unjudged)) => {
+    let (folder, report) = match judge_guarded(result, question, settings) {
+        Ok(judged) => judged,
+        Err(unjudged) => {
             eprint_line(&format!("{name}: not judged: {unjudged}"));
-            return Ok(Exit::Refused);
-        }
-        Err(broken) => {
-            eprint_line(&format!("{name}: not judged: {}", broken.message));
             return Ok(Exit::Refused);
         }
     };
@@ -105,15 +96,29 @@ pub fn check_mesh(
     Ok(if report.faithful && report.fine { Exit::Success } else { Exit::Refused })
 }
 
+/// The folder of a result, and what is found; a panic is a reason not to judge.
+fn judge_guarded<'r>(
+    result: &'r Path,
+    question: &Question,
+    settings: &Settings,
+) -> Result<(&'r Path, MeshReport), Unjudged> {
+    let Some(folder) = folder(result) else {
+        return Err(Unjudged::Told(format!("{} is neither a result folder nor a report.json", escape(result))));
+    };
+    let judged: Result<_, Reason> = guard(|| Ok(judge(folder, question, settings)));
+    let report = judged.map_err(|broken| Unjudged::Told(broken.message))??;
+    Ok((folder, report))
+}
+
+/// What is found about a mesh, against the result in `folder`.
 fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<MeshReport, Unjudged> {
-    let told = |problem: &dyn std::fmt::Display| Unjudged::Told(problem.to_string());
-    let report = read_report(folder).map_err(|e| told(&e))?;
+    let report = read_report(folder).map_err(|finding| Unjudged::Told(finding.to_string()))?;
     // Files are large, and one is done with before the next: they share their memory.
     let mut bytes = Vec::new();
     let (surface_file, surface, charts) = surface(folder, &report, &mut bytes)?;
     let size = question.size.or(report.hand_off.as_ref().map(|h| h.size)).ok_or(Unjudged::NoSize)?;
-    read_file_into(&question.mesh, &mut bytes).map_err(|e| told(&e.message))?;
-    let patches = decode(&question.mesh, &bytes, settings).map_err(|e| told(&e.message))?;
+    read_file_into(&question.mesh, &mut bytes).map_err(|reason| Unjudged::Told(reason.message))?;
+    let patches = decode(&question.mesh, &bytes, settings).map_err(|reason| Unjudged::Told(reason.message))?;
     let name = question.mesh.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let mesh_file = Output::of(&name, &bytes);
     let atlas = if patches.surfaces().is_some() { atlas(folder, &report, &mut bytes)? } else { None };
@@ -134,15 +139,21 @@ fn surface(folder: &Path, report: &Report, bytes: &mut Vec<u8>) -> Result<(Outpu
 
 /// The triangles of a surface by their corners, without the nodes in the middle of sides.
 fn corners_of(shape: &Shape) -> Triangulation {
-    let mut number = vec![u32::MAX; shape.points.len()];
     let corners = || shape.cells.iter().map(|[a, b, c, ..]| [*a, *b, *c]);
-    corners().flatten().for_each(|node| number[node as usize] = 0);
-    let mut points = Vec::new();
-    for (number, point) in number.iter_mut().zip(&shape.points).filter(|(number, _)| **number == 0) {
-        *number = points.len() as u32;
-        points.push(*point);
+    let mut is_corner = vec![false; shape.points.len()];
+    for node in corners().flatten() {
+        is_corner[node as usize] = true;
     }
-    Triangulation::welded(&points, corners().map(|t| t.map(|node| number[node as usize])))
+    // The corners alone, numbered anew in the same order.
+    let mut points = Vec::new();
+    let mut number = vec![u32::MAX; shape.points.len()];
+    for (node, point) in shape.points.iter().enumerate() {
+        if is_corner[node] {
+            number[node] = points.len() as u32;
+            points.push(*point);
+        }
+    }
+    Triangulation::welded(&points, corners().map(|corners| corners.map(|node| number[node as usize])))
 }
 
 /// The maps that the mesher used, if the result has any.
@@ -177,20 +188,23 @@ fn decode(path: &Path, bytes: &[u8], settings: &Settings) -> Result<Patches, Rea
 
 /// The mesh in the terms of the core. Nodes of MSH files that lie on each other are made one, as in other formats.
 fn mesh(patches: &Patches) -> Mesh {
-    let all = patches.triangles().iter().copied();
-    let flat = patches.mids().iter().map(|m| m.unwrap_or_default());
-    // Corners and nodes in the middle are welded alike.
-    let welded = Triangulation::welded(patches.points(), all.chain(flat));
-    let count = patches.triangles().len();
-    let (triangles, mids) = welded.triangles.split_at(count);
-    let mids = patches.mids().iter().zip(mids).map(|(m, welded)| m.map(|_| *welded)).collect();
-    // Tags begin with 1.
-    let chart = |tag: &i64| tag.checked_sub(1).and_then(|c| u32::try_from(c).ok()).unwrap_or(u32::MAX);
+    let corners = patches.triangles().iter().copied();
+    // Where an element has no nodes in the middle, three zeros hold its place.
+    let flat = patches.mids().iter().map(|mids| mids.unwrap_or_default());
+    // Corners and nodes in the middle are welded alike: as triangles of one list, and taken apart again.
+    let welded = Triangulation::welded(patches.points(), corners.chain(flat));
+    let (triangles, welded_mids) = welded.triangles.split_at(patches.triangles().len());
+    let mids = patches.mids().iter().zip(welded_mids).map(|(mids, welded)| mids.map(|_| *welded)).collect();
     Mesh {
         triangulation: Triangulation { triangles: triangles.to_vec(), points: welded.points },
         mids,
-        charts: patches.surfaces().map(|tags| tags.iter().map(chart).collect()),
+        charts: patches.surfaces().map(|tags| tags.iter().map(chart_of_tag).collect()),
     }
+}
+
+/// The chart of an entity: tags begin with 1. What can be no chart becomes a number that none has.
+fn chart_of_tag(tag: &i64) -> u32 {
+    tag.checked_sub(1).and_then(|chart| u32::try_from(chart).ok()).unwrap_or(u32::MAX)
 }
 
 /// Puts the report beside that of the result, whole or not at all.
@@ -217,8 +231,10 @@ fn text(name: &str, report: &MeshReport) -> String {
     let mut lines = vec![format!("{name}: {verdict}; judged {by}")];
     lines.extend(report.defects.iter().map(|d| format!("  {}{}", d.message, located(d.at))));
     let (gamma, edges) = (report.gamma, report.edges);
-    let curved =
-        if report.curved_elements > 0 { format!(", {} of six nodes", report.curved_elements) } else { String::new() };
+    let curved = match report.curved_elements {
+        0 => String::new(),
+        count => format!(", {count} of six nodes"),
+    };
     lines.push(format!("  elements  {}{curved}; area {:.4} of the surface's", report.elements, report.area_ratio));
     lines.push(format!(
         "  distance  nodes off the surface by {:.2e} at most; surface off the mesh by {:.3} edge lengths at most",

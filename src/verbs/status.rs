@@ -42,7 +42,9 @@ pub fn status(asked: &cli::Status, settings: &Settings) -> Result<Exit, Box<dyn 
     if asked.json {
         say_json(&answer(out, running, daemon, health))?;
     } else if asked.health {
-        health.facts.iter().for_each(|fact| say(&fact.to_string()));
+        for fact in &health.facts {
+            say(&fact.to_string());
+        }
     } else {
         say(&text(&answer(out, running, daemon, health)));
     }
@@ -56,8 +58,12 @@ fn answer(out: &Path, running: bool, daemon: Option<Status>, health: Health) -> 
         results.count(entry.status);
         refusals.extend(entry.refused_components.iter().map(|refused| not_in_result(&name, refused)));
         if entry.status != Outcome::Certified {
-            let (code, message) = entry.reason.map_or((None, String::new()), |r| (Some(r.code), r.message));
-            refusals.push(Refusal { name: name.to_string_lossy().into_owned(), status: entry.status, code, message });
+            let (code, message) = match entry.reason {
+                Some(reason) => (Some(reason.code), reason.message),
+                None => (None, String::new()),
+            };
+            let name = name.to_string_lossy().into_owned();
+            refusals.push(Refusal { name, status: entry.status, code, message });
         }
     }
     Answer { running, daemon, results, refusals, health }
@@ -80,28 +86,39 @@ fn not_in_result(name: &Path, refused: &RefusedComponent) -> Refusal {
 fn text(answer: &Answer) -> String {
     let mut lines = vec![headline(answer)];
     if let Some(daemon) = &answer.daemon {
-        lines.push(format!(
-            "{} wait, {} run, {} have not settled",
-            daemon.waiting,
-            daemon.running.len(),
-            daemon.unsettled
-        ));
-        lines.extend(daemon.paused.as_ref().map(|paused| format!("  {:12} {}", "paused", plain(paused))));
-        lines.extend(daemon.running.iter().map(progress));
-        lines.extend(daemon.next.iter().take(NAMED).map(|name| format!("  {:12} {}", "waits", plain(name))));
-        lines.extend((daemon.waiting > NAMED).then(|| format!("  and {} more", daemon.waiting - NAMED)));
-        lines.extend(daemon.notable.iter().take(NAMED).map(noted));
-        let more = daemon.notables.saturating_sub(NAMED);
-        lines.extend((more > 0).then(|| format!("  and {more} more that are not done")));
+        lines.extend(doings(daemon));
     }
     let Counts { certified, refused, failed } = answer.results;
     lines.push(format!("results: {certified} certified, {refused} refused, {failed} failed"));
     lines.extend(answer.refusals.iter().take(NAMED).map(refusal));
-    let more = answer.refusals.len().saturating_sub(NAMED);
-    lines.extend((more > 0).then(|| format!("  and {more} more; --json lists all")));
+    if answer.refusals.len() > NAMED {
+        lines.push(format!("  and {} more; --json lists all", answer.refusals.len() - NAMED));
+    }
     lines.join("\n")
 }
 
+/// What a daemon does, one thing a line.
+fn doings(daemon: &Status) -> Vec<String> {
+    let (waiting, running, unsettled) = (daemon.waiting, daemon.running.len(), daemon.unsettled);
+    let mut lines = vec![format!("{waiting} wait, {running} run, {unsettled} have not settled")];
+    if let Some(paused) = &daemon.paused {
+        lines.push(format!("  {:12} {}", "paused", plain(paused)));
+    }
+    lines.extend(daemon.running.iter().map(progress));
+    for name in daemon.next.iter().take(NAMED) {
+        lines.push(format!("  {:12} {}", "waits", plain(name)));
+    }
+    if waiting > NAMED {
+        lines.push(format!("  and {} more", waiting - NAMED));
+    }
+    lines.extend(daemon.notable.iter().take(NAMED).map(noted));
+    if daemon.notables > NAMED {
+        lines.push(format!("  and {} more that are not done", daemon.notables - NAMED));
+    }
+    lines
+}
+
+/// Whether a daemon runs, and where.
 fn headline(answer: &Answer) -> String {
     match (&answer.daemon, answer.running) {
         (Some(daemon), true) => {

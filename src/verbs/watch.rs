@@ -42,7 +42,9 @@ pub fn watch(
     let publisher = Arc::new(Publisher::open(out)?);
     let mut lock = Lock::take(out)?;
     holding::recover(&System, inbox, settings.recursive);
-    destinations(settings).for_each(|(_, folder)| holding::clear(&System, folder, settings.recursive));
+    for (_, folder) in destinations(settings) {
+        holding::clear(&System, folder, settings.recursive);
+    }
     let conveyor = Conveyor::start(settings, publisher.clone(), true).map_err(|e| super::no_threads(&e))?;
     tracing::info!(inbox = escape(inbox), out = escape(out), "watches");
     let source = Source { read, is_possible: &|settings| can_go(inbox, out, settings) };
@@ -66,10 +68,14 @@ pub(super) fn no_inbox(inbox: &Path, error: &std::io::Error) -> String {
 pub(super) fn refuse_nested(inbox: &Path, out: &Path, settings: &Settings) -> Result<(), FolderError> {
     let watched = FolderRole::new("inbox", inbox);
     let mut all = vec![watched, FolderRole::new("output folder", out)];
-    all.extend(destinations(settings).map(|(role, folder)| FolderRole::new(role, folder)));
+    for (role, folder) in destinations(settings) {
+        all.push(FolderRole::new(role, folder));
+    }
     folder_checks::refuse_nested(&all)?;
-    let metrics = settings.metrics.iter().map(|file| FolderRole::new("file of metrics", file));
-    folder_checks::refuse_nested(&[watched].into_iter().chain(metrics).collect::<Vec<_>>())
+    // It may lie in the other folders: only what appears in the inbox is taken for an input.
+    let mut with_metrics = vec![watched];
+    with_metrics.extend(settings.metrics.iter().map(|file| FolderRole::new("file of metrics", file)));
+    folder_checks::refuse_nested(&with_metrics)
 }
 
 /// Refuses a file of metrics for which there is no folder.
@@ -89,9 +95,14 @@ pub(super) fn takes_inputs_out(settings: &Settings) -> bool {
 
 /// Whether inputs can go where settings say that were read while the daemon runs: to folders that are there.
 fn can_go(inbox: &Path, out: &Path, settings: &Settings) -> bool {
-    let are_there = destinations(settings).all(|(_, folder)| folder.is_dir());
-    let can_leave = || !takes_inputs_out(settings) || holding::try_out(&System, inbox).is_ok();
-    are_there && refuse_nested(inbox, out, settings).is_ok() && can_leave()
+    if !destinations(settings).all(|(_, folder)| folder.is_dir()) {
+        return false;
+    }
+    if refuse_nested(inbox, out, settings).is_err() {
+        return false;
+    }
+    // Last, as that makes a folder in the inbox and removes it.
+    !takes_inputs_out(settings) || holding::try_out(&System, inbox).is_ok()
 }
 
 /// The folders to which inputs are moved, with what they are for.

@@ -152,6 +152,25 @@ impl File {
 
 impl Inbox {
     /// Takes in what a look at `now` shows; tells what is to be done.
+    ///
+    /// ```
+    /// use planish::system::fingerprint::Fingerprint;
+    /// use planish::watch::inbox::{Change, Inbox, SETTLE, Seen, Snapshot};
+    /// use std::time::Instant;
+    ///
+    /// # fn main() -> std::io::Result<()> {
+    /// # let file = tempfile::NamedTempFile::new()?;
+    /// let look = Fingerprint::at(file.path())?.expect("a regular file");
+    /// let snapshot = Snapshot::from([("part.stl".into(), Seen { look, beside: vec![] })]);
+    /// let (mut inbox, begin) = (Inbox::default(), Instant::now());
+    /// assert_eq!(inbox.look(&snapshot, begin), []);
+    /// let settled = Change::Settled("part.stl".into(), look, begin);
+    /// assert_eq!(inbox.look(&snapshot, begin + SETTLE), [settled]);
+    /// // It goes while its job waits or runs.
+    /// assert_eq!(inbox.look(&Snapshot::new(), begin + SETTLE), [Change::Withdrawn("part.stl".into())]);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn look(&mut self, snapshot: &Snapshot, now: Instant) -> Vec<Change> {
         let mut changes = Vec::new();
         self.files.retain(|name, file| {
@@ -202,17 +221,27 @@ impl Inbox {
         file.failures
     }
 
+    /// The file, if the job for this state of it is the one that is on its way.
     fn submitted(&mut self, name: &Path, look: &Fingerprint) -> Option<&mut File> {
+        // Where the file has changed since, its older job says nothing about it.
         self.files.get_mut(name).filter(|file| file.seen.look == *look && file.state == State::Submitted)
     }
 
     /// The next `count` files whose results should stand, after those that were named the last time.
     pub fn published(&mut self, count: usize) -> Vec<PathBuf> {
-        let is_published = |(_, file): &(&PathBuf, &File)| matches!(file.state, State::Done(Rest::Published, _));
         let behind = (Bound::Excluded(self.looked_for.clone()), Bound::Unbounded);
-        let next = self.files.range(behind).filter(is_published).map(|(name, _)| name.clone());
-        let next: Vec<PathBuf> = next.take(count).collect();
-        self.looked_for = if next.len() == count { next.last().cloned().unwrap_or_default() } else { PathBuf::new() };
+        let mut next = Vec::new();
+        for (name, file) in self.files.range(behind) {
+            if next.len() == count {
+                break;
+            }
+            if matches!(file.state, State::Done(Rest::Published, _)) {
+                next.push(name.clone());
+            }
+        }
+        // Fewer than asked for: that was the last of them, and it begins again before the first name.
+        let is_at_end = next.len() < count;
+        self.looked_for = if is_at_end { PathBuf::new() } else { next.last().cloned().unwrap_or_default() };
         next
     }
 
@@ -226,9 +255,12 @@ impl Inbox {
     /// All files are looked at anew, as if they had just come: what is up to date is found to be so. What was delivered is
     /// not: its result was taken away on purpose.
     pub fn forget_all(&mut self, now: Instant) {
-        let is_at_rest = |state: &State| !matches!(state, State::Submitted | State::Done(Rest::Delivered, _));
-        let at_rest = self.files.values_mut().filter(|file| is_at_rest(&file.state));
-        at_rest.for_each(|file| *file = File::new(file.seen.clone(), now));
+        for file in self.files.values_mut() {
+            // A job that runs tells by itself what became of its file.
+            if !matches!(file.state, State::Submitted | State::Done(Rest::Delivered, _)) {
+                *file = File::new(file.seen.clone(), now);
+            }
+        }
     }
 
     /// When something is to be done next, if nothing changes.
@@ -243,8 +275,9 @@ impl Inbox {
 
     /// Since when the file has waited that has waited the longest for its result, jobs included.
     pub fn oldest(&self) -> Option<Instant> {
-        let is_on_its_way = |file: &&File| !matches!(file.state, State::Done(Rest::Published | Rest::Delivered, _));
-        self.files.values().filter(is_on_its_way).map(|file| file.restless).min()
+        let on_their_way =
+            self.files.values().filter(|file| !matches!(file.state, State::Done(Rest::Published | Rest::Delivered, _)));
+        on_their_way.map(|file| file.restless).min()
     }
 
     /// The files that have been notable for as long as this, each once.

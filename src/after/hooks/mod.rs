@@ -32,7 +32,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A command may print this much, in bytes, on standard output and on standard error.
+/// A command may print this much, in bytes, on standard output and on standard error. By experience:
+/// less would end programs that tell all that they do, more lets one run on that prints without end.
 const OUTPUT: u64 = 256 << 20;
 
 /// The result for which commands run.
@@ -127,7 +128,8 @@ fn at(path: &Path) -> impl FnOnce(io::Error) -> HookError {
 
 /// What became of the commands of a result, if that is told.
 pub fn account(target: &Target) -> Option<Account> {
-    serde_json::from_slice(&read_file(&target.folder.join(result_files::HOOKS)).ok()?).ok()
+    let text = read_file(&target.folder.join(result_files::HOOKS)).ok()?;
+    serde_json::from_slice(&text).ok()
 }
 
 /// Whether `hooks` have not run for the report that is in the folder, or are configured otherwise since. A chain that
@@ -224,16 +226,19 @@ fn program(hook: &Hook, target: &Target) -> Command {
 
 /// Program and arguments as they may be shown.
 fn describe(command: &Command) -> Vec<String> {
-    std::iter::once(command.get_program()).chain(command.get_args()).map(|w| w.to_string_lossy().into_owned()).collect()
+    let mut words = vec![command.get_program().to_string_lossy().into_owned()];
+    words.extend(command.get_args().map(|argument| argument.to_string_lossy().into_owned()));
+    words
 }
 
 /// Writes the account at once: complete, or not there.
 fn write(account: &Account, target: &Target, staging: &Path) -> Result<(), HookError> {
-    let text = printable_json(&serde_json::to_string_pretty(account).map_err(HookError::Account)?) + "\n";
+    let json = serde_json::to_string_pretty(account).map_err(HookError::Account)?;
+    let text = printable_json(&json) + "\n";
     let desk = System.open(staging).map_err(at(staging))?;
     let folder = System.open(&target.folder).map_err(at(&target.folder))?;
-    disk::replace_file(&desk, &folder, result_files::HOOKS, text.as_bytes())
-        .map_err(at(&target.folder.join(result_files::HOOKS)))
+    let written = disk::replace_file(&desk, &folder, result_files::HOOKS, text.as_bytes());
+    written.map_err(at(&target.folder.join(result_files::HOOKS)))
 }
 
 #[cfg(test)]

@@ -122,8 +122,11 @@ impl Output {
     /// The end of the output, cut between characters where it is text.
     fn tail(self) -> Tail {
         let truncated = self.bytes > self.kept.len() as u64;
-        let continues = |byte: &&u8| **byte & 0xC0 == 0x80;
-        let cut = if truncated { self.kept.iter().take(3).take_while(continues).count() } else { 0 };
+        let mut cut = 0;
+        if truncated {
+            // The bytes of a character behind its first one, of which there are three at most, begin with the bits 10.
+            cut = self.kept.iter().take(3).take_while(|byte| **byte & 0xC0 == 0x80).count();
+        }
         Tail { text: String::from_utf8_lossy(&self.kept[cut..]).into_owned(), truncated }
     }
 }

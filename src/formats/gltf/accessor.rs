@@ -24,14 +24,15 @@ struct Layout<'a> {
 impl<'a> Layout<'a> {
     /// Checks that `count` elements of `size` bytes are there.
     fn new(view: (&'a [u8], Option<usize>), offset: u64, count: usize, size: usize) -> Result<Self, String> {
-        let (bytes, stride) = (view.0, view.1.unwrap_or(size));
+        let (bytes, stride) = view;
+        // Without a stride, elements are packed tightly.
+        let stride = stride.unwrap_or(size);
         if stride < size {
             return Err(format!("a stride of {stride} bytes for elements of {size}"));
         }
-        let rest = usize::try_from(offset).ok().and_then(|o| bytes.get(o..));
+        let rest = usize::try_from(offset).ok().and_then(|offset| bytes.get(offset..));
         let rest = rest.ok_or_else(|| format!("byte {offset} of {}", bytes.len()))?;
-        let needed = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
-        match needed {
+        match needed_bytes(count, stride, size) {
             Some(needed) if needed <= rest.len() => Ok(Self { bytes: rest, stride, count }),
             _ => Err(format!("{count} elements, {stride} bytes apart, in {} bytes", rest.len())),
         }
@@ -57,6 +58,15 @@ impl<'a> Layout<'a> {
     }
 }
 
+/// The bytes that `count` elements of `size` bytes take, a stride from each to the next; none where they are too many to be
+/// told. The last one need not be filled up to the stride.
+fn needed_bytes(count: usize, stride: usize, size: usize) -> Option<usize> {
+    match count.checked_sub(1) {
+        None => Some(0),
+        Some(last) => last.checked_mul(stride)?.checked_add(size),
+    }
+}
+
 impl Accessors<'_> {
     /// The vectors of an accessor.
     pub fn positions(&self, index: Index<Accessor>) -> Result<Vec<[f64; 3]>, GltfError> {
@@ -73,12 +83,15 @@ impl Accessors<'_> {
         let mut vectors = match accessor.buffer_view {
             Some(view) => read(view, accessor.byte_offset.map_or(0, |o| o.0), count)?,
             None if accessor.sparse.is_none() => return Err(self.without_data(index)),
+            // Zeros, of which some are replaced below.
             None => vec![[0.0; 3]; count],
         };
         if let Some(sparse) = &accessor.sparse {
             let places = self.sparse_places(sparse, count).map_err(|e| e.at(index))?;
             let values = read(sparse.values.buffer_view, sparse.values.byte_offset.0, places.len())?;
-            places.into_iter().zip(values).for_each(|(i, value)| vectors[i] = value);
+            for (place, value) in places.into_iter().zip(values) {
+                vectors[place] = value;
+            }
         }
         Ok(vectors)
     }
@@ -112,26 +125,30 @@ impl Accessors<'_> {
 
     /// Without data of its own, an accessor's may be compressed: that has a name.
     fn without_data(&self, index: Index<Accessor>) -> GltfError {
-        let used = self.root.extensions_used.iter().find(|name| name.contains("compression"));
-        used.map_or_else(|| broken(location(index), "no data"), |name| GltfError::Extension(super::escape(name)))
+        let compression = self.root.extensions_used.iter().find(|name| name.contains("compression"));
+        match compression {
+            Some(name) => GltfError::Extension(super::escape(name)),
+            None => broken(location(index), "no data"),
+        }
     }
 
     /// The places whose values a sparse accessor gives.
     fn sparse_places(&self, sparse: &sparse::Sparse, count: usize) -> Result<Vec<usize>, Sparse> {
-        let given = usize::try_from(sparse.count.0).ok().filter(|n| *n <= count);
-        let given = given.ok_or_else(|| Sparse::Broken("more sparse values than elements".to_owned()))?;
-        let kind = match sparse.indices.component_type {
-            Checked::Valid(kind) => Some(kind.0).filter(|kind| is_index(*kind)),
-            Checked::Invalid => None,
+        let given = match usize::try_from(sparse.count.0) {
+            Ok(given) if given <= count => given,
+            _ => return Err(Sparse::Broken("more sparse values than elements".to_owned())),
         };
-        let kind = kind.ok_or_else(|| Sparse::Broken("an unknown type of sparse indices".to_owned()))?;
+        let kind = match sparse.indices.component_type {
+            Checked::Valid(kind) if is_index(kind.0) => kind.0,
+            _ => return Err(Sparse::Broken("an unknown type of sparse indices".to_owned())),
+        };
         let view = self.buffers.view(sparse.indices.buffer_view).map_err(Sparse::View)?;
         let layout = Layout::new(view, sparse.indices.byte_offset.0, given, kind.size()).map_err(Sparse::Broken)?;
         let places: Vec<usize> = indices(&layout, kind).into_iter().map(|index| index as usize).collect();
-        match places.iter().find(|p| **p >= count) {
-            Some(index) => Err(Sparse::Broken(format!("sparse value {index} of {count}"))),
-            None => Ok(places),
+        if let Some(place) = places.iter().find(|place| **place >= count) {
+            return Err(Sparse::Broken(format!("sparse value {place} of {count}")));
         }
+        Ok(places)
     }
 }
 

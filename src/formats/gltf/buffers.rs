@@ -34,9 +34,11 @@ impl<'a> Buffers<'a> {
             if declared > bytes.len() as u64 {
                 let problem = format!("{declared} bytes are declared, but there are {}", bytes.len());
                 let is_beside = buffer.uri.as_ref().is_some_and(|uri| !uri.starts_with("data:"));
-                // It may not have been copied to its end yet.
-                let missing = is_beside.then(|| GltfError::Missing { buffer: i, problem: problem.clone() });
-                return Err(missing.unwrap_or_else(|| broken(format!("buffers[{i}]"), problem)));
+                if is_beside {
+                    // It may not have been copied to its end yet.
+                    return Err(GltfError::Missing { buffer: i, problem });
+                }
+                return Err(broken(format!("buffers[{i}]"), problem));
             }
             left = left.saturating_sub(bytes.len() as u64);
             data.push(bytes);
@@ -50,12 +52,20 @@ impl<'a> Buffers<'a> {
         let fail = |problem: String| broken(format!("bufferViews[{i}]"), problem);
         let view = self.root.buffer_views.get(i).ok_or_else(|| fail("there is none".to_owned()))?;
         let data = self.data.get(view.buffer.value()).ok_or_else(|| fail("its buffer is not there".to_owned()))?;
-        let (from, length) = (view.byte_offset.map_or(0, |o| o.0), view.byte_length.0);
-        let bytes = usize::try_from(from).ok().and_then(|from| data.get(from..));
-        let bytes = bytes.zip(usize::try_from(length).ok()).and_then(|(bytes, length)| bytes.get(..length));
-        let bytes = bytes.ok_or_else(|| fail(format!("bytes {from} and {length} more, of {}", data.len())))?;
-        Ok((bytes, view.byte_stride.map(|s| s.0).filter(|s| *s > 0)))
+        let from = view.byte_offset.map_or(0, |offset| offset.0);
+        let length = view.byte_length.0;
+        let Some(bytes) = part(data, from, length) else {
+            return Err(fail(format!("bytes {from} and {length} more, of {}", data.len())));
+        };
+        // A stride of zero is none (glTF 2.0 has no such): elements are packed tightly.
+        Ok((bytes, view.byte_stride.map(|stride| stride.0).filter(|stride| *stride > 0)))
     }
+}
+
+/// So many bytes from one on, if all of them are there.
+fn part(data: &[u8], from: u64, length: u64) -> Option<&[u8]> {
+    let rest = data.get(usize::try_from(from).ok()?..)?;
+    rest.get(..usize::try_from(length).ok()?)
 }
 
 /// The bytes behind the address of a buffer.
@@ -70,7 +80,10 @@ fn fetch(uri: &str, buffer: usize, most: u64, source: &Source) -> Result<Vec<u8>
 /// What follows `data:`, if it is base64.
 fn embedded(data: &str) -> Option<Vec<u8>> {
     let (kind, text) = data.split_once(',')?;
-    kind.to_ascii_lowercase().ends_with(";base64").then(|| BASE64.decode(text.trim()).ok()).flatten()
+    if !kind.to_ascii_lowercase().ends_with(";base64") {
+        return None;
+    }
+    BASE64.decode(text.trim()).ok()
 }
 
 /// The name of a file, if the address is nothing but that: no scheme, no folder but that of the document (`./`), nothing
@@ -93,8 +106,11 @@ fn percent_decoded(text: &str) -> Option<String> {
     while let Some((first, tail)) = rest.split_first() {
         rest = tail;
         if *first == b'%' {
-            let digits =
-                std::str::from_utf8(tail.get(..2)?).ok().filter(|d| d.bytes().all(|b| b.is_ascii_hexdigit()))?;
+            // Two digits: a sign, which the parser would take, is none.
+            let digits = std::str::from_utf8(tail.get(..2)?).ok()?;
+            if !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+                return None;
+            }
             bytes.push(u8::from_str_radix(digits, 16).ok()?);
             rest = &tail[2..];
         } else {

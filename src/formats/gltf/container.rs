@@ -44,6 +44,7 @@ pub(super) fn split(bytes: &[u8]) -> Result<Parts<'_>, GltfError> {
 /// The chunk at `at` and where the next one begins, if it is of this kind.
 fn chunk<'a>(bytes: &'a [u8], at: usize, kind: &[u8]) -> Result<Option<(&'a [u8], usize)>, GltfError> {
     let length = number(bytes, at)? as usize;
+    // Behind the length and the kind, four bytes each.
     let data = bytes.get(at + 8..).and_then(|rest| rest.get(..length));
     let Some(data) = data else {
         let room = bytes.len().saturating_sub(at + 8);
@@ -53,8 +54,10 @@ fn chunk<'a>(bytes: &'a [u8], at: usize, kind: &[u8]) -> Result<Option<(&'a [u8]
     Ok((&bytes[at + 4..at + 8] == kind).then_some((data, at + 8 + length)))
 }
 
+/// The number of four bytes at `at`.
 fn number(bytes: &[u8], at: usize) -> Result<u32, GltfError> {
-    let four = bytes.get(at..at + 4).and_then(|b| b.try_into().ok());
-    four.map(u32::from_le_bytes)
-        .ok_or_else(|| GltfError::Container { byte: bytes.len(), problem: "the file ends in a header".to_owned() })
+    match bytes.get(at..).and_then(|rest| rest.first_chunk()) {
+        Some(four) => Ok(u32::from_le_bytes(*four)),
+        None => Err(GltfError::Container { byte: bytes.len(), problem: "the file ends in a header".to_owned() }),
+    }
 }

@@ -20,9 +20,18 @@ pub(super) struct Scene {
     pub skipped: BTreeMap<&'static str, usize>,
 }
 
-/// An affine map: three columns and the place of the origin.
+/// An affine map: three columns and the image of the origin.
 #[derive(Clone, Copy)]
 struct Transform([[f64; 3]; 4]);
+
+/// A node on the way through the scene that is still to be visited.
+struct Waiting {
+    node: Index<Node>,
+    /// The map of all nodes above it, from the root on.
+    above: Transform,
+    /// How many nodes are above it.
+    level: usize,
+}
 
 /// What is needed on the way through the nodes.
 struct Walk<'a> {
@@ -52,20 +61,15 @@ impl Scene {
 /// The meshes that nodes show, with their places. Every node is visited once: one with two parents, or above itself,
 /// is an error (glTF 2.0, 3.5.2). So the walk ends.
 fn instances(root: &Root, depth: usize) -> Result<Vec<(usize, Transform)>, GltfError> {
-    // With the number of nodes above each.
-    let mut waiting: Vec<(Index<Node>, Transform, usize)> = Vec::new();
-    let identity = |node: &Index<Node>| (*node, Transform::IDENTITY, 0);
-    match root.scene.map(|s| s.value()).or((!root.scenes.is_empty()).then_some(0)) {
-        Some(i) => {
-            let scene = root.scenes.get(i).ok_or_else(|| broken(format!("scenes[{i}]"), "there is none"))?;
-            waiting.extend(scene.nodes.iter().rev().map(identity));
-        }
-        None => waiting.extend(roots(root).iter().rev().map(identity)),
+    // A stack: nodes are pushed in the opposite order, so that they are visited in that of the file.
+    let mut waiting: Vec<Waiting> = Vec::new();
+    for node in top_nodes(root)?.into_iter().rev() {
+        waiting.push(Waiting { node, above: Transform::IDENTITY, level: 0 });
     }
     let mut visited = vec![false; root.nodes.len()];
     let mut found = Vec::new();
-    while let Some((index, above, level)) = waiting.pop() {
-        let i = index.value();
+    while let Some(Waiting { node, above, level }) = waiting.pop() {
+        let i = node.value();
         let fail = |problem: &str| broken(format!("nodes[{i}]"), problem);
         let node = root.nodes.get(i).ok_or_else(|| fail("there is none"))?;
         if std::mem::replace(&mut visited[i], true) {
@@ -77,9 +81,19 @@ fn instances(root: &Root, depth: usize) -> Result<Vec<(usize, Transform)>, GltfE
         }
         let here = above.then(&Transform::of(node));
         found.extend(node.mesh.map(|mesh| (mesh.value(), here)));
-        waiting.extend(node.children.iter().flatten().rev().map(|child| (*child, here, level + 1)));
+        for child in node.children.iter().flatten().rev() {
+            waiting.push(Waiting { node: *child, above: here, level: level + 1 });
+        }
     }
     Ok(found)
+}
+
+/// The nodes at which the default scene begins: that of the document or its first one, or all roots where it has none.
+fn top_nodes(root: &Root) -> Result<Vec<Index<Node>>, GltfError> {
+    let first = if root.scenes.is_empty() { None } else { Some(0) };
+    let Some(i) = root.scene.map(|scene| scene.value()).or(first) else { return Ok(roots(root)) };
+    let scene = root.scenes.get(i).ok_or_else(|| broken(format!("scenes[{i}]"), "there is none"))?;
+    Ok(scene.nodes.clone())
 }
 
 /// The nodes that are no children.
@@ -133,14 +147,18 @@ impl Walk<'_> {
             let problem = format!("{total} points or triangles with all instances, more than {}", self.most);
             return Err(GltfError::TooMuch { location: location.to_owned(), problem });
         }
-        points.iter_mut().for_each(|p| *p = transform.of_point(*p));
+        for point in &mut points {
+            *point = transform.of_point(*point);
+        }
         if base == 0 {
+            // Most files have one primitive: its points are not copied.
             self.scene.points = points;
         } else {
             self.scene.points.extend(points);
         }
         self.scene.triangles.reserve(corners.len() / 3);
         let base = base as u32;
+        // A map that mirrors turns triangles over: exchanging two corners turns them back.
         let is_mirrored = transform.determinant() < 0.0;
         for_triangles(mode, &corners, |[a, b, c]| {
             let [b, c] = if is_mirrored { [c, b] } else { [b, c] };
@@ -154,9 +172,23 @@ impl Walk<'_> {
 fn for_triangles(mode: Mode, corners: &[u32], mut add: impl FnMut([u32; 3])) {
     let threes = corners.windows(3);
     match mode {
-        Mode::TriangleStrip => threes.enumerate().for_each(|(i, t)| add([t[0], t[1 + i % 2], t[2 - i % 2]])),
-        Mode::TriangleFan => threes.for_each(|t| add([t[1], t[2], corners[0]])),
-        _ => corners.as_chunks().0.iter().for_each(|t| add(*t)),
+        Mode::TriangleStrip => {
+            for (i, t) in threes.enumerate() {
+                // Every other one would turn the other way.
+                add([t[0], t[1 + i % 2], t[2 - i % 2]]);
+            }
+        }
+        Mode::TriangleFan => {
+            for t in threes {
+                add([t[1], t[2], corners[0]]);
+            }
+        }
+        // Corners that make no whole triangle are left out.
+        _ => {
+            for t in corners.as_chunks().0 {
+                add(*t);
+            }
+        }
     }
 }
 
@@ -169,6 +201,7 @@ impl Transform {
             let column = |k: usize| [0, 1, 2].map(|i| f64::from(m[4 * k + i]));
             return Self([column(0), column(1), column(2), column(3)]);
         }
+        // The matrix of a unit quaternion, by columns.
         let [x, y, z, w] = node.rotation.map_or([0.0, 0.0, 0.0, 1.0], |q| q.0.map(f64::from));
         let rotation = [
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)],

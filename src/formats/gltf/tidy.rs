@@ -45,8 +45,10 @@ impl<'a> Document<'a> {
     pub fn tidied(&self) -> Vec<u8> {
         let mut changes: Vec<Change> = UNREAD.iter().filter_map(|name| self.emptied(name)).collect();
         changes.extend(self.completed_scenes());
+        // They are of different parts of the document: none overlaps another.
         changes.sort_by_key(|(range, _)| range.start);
-        let (mut tidied, mut at) = (Vec::with_capacity(self.json.len()), 0);
+        let mut tidied = Vec::with_capacity(self.json.len());
+        let mut at = 0;
         for (range, text) in changes {
             tidied.extend_from_slice(&self.json[at..range.start]);
             tidied.extend_from_slice(text.as_bytes());
@@ -59,34 +61,44 @@ impl<'a> Document<'a> {
     /// A list with nothing in it but the ends of its lines.
     fn emptied(&self, name: &str) -> Option<Change> {
         let list = self.parts.get(name)?.get();
+        if !list.starts_with('[') {
+            return None;
+        }
         let lines: String = list.chars().filter(|c| *c == '\n').collect();
-        list.starts_with('[').then(|| (self.range(list), format!("[{lines}]")))
+        Some((self.range(list), format!("[{lines}]")))
     }
 
     /// Scenes that lack their list of nodes.
     fn completed_scenes(&self) -> Vec<Change> {
-        #[derive(Deserialize)]
-        struct Scene {
-            nodes: Option<IgnoredAny>,
-        }
-        let scenes = self.parts.get("scenes").and_then(|scenes| serde_json::from_str(scenes.get()).ok());
-        let scenes: Vec<&RawValue> = scenes.unwrap_or_default();
-        let lacks_nodes = |scene: &str| {
-            scene.starts_with('{') && serde_json::from_str(scene).is_ok_and(|scene: Scene| scene.nodes.is_none())
-        };
-        let complete = |scene: &str| {
+        let mut changes = Vec::new();
+        let Some(scenes) = self.parts.get("scenes") else { return changes };
+        // What is no list is left to the library, which tells what is wrong.
+        let scenes: Vec<&RawValue> = serde_json::from_str(scenes.get()).unwrap_or_default();
+        for scene in scenes.into_iter().map(RawValue::get) {
+            if !lacks_nodes(scene) {
+                continue;
+            }
             let inside = self.range(scene).start + 1;
             let is_empty = scene[1..].trim_start().starts_with('}');
-            (inside..inside, format!("{NO_NODES}{}", if is_empty { "" } else { "," }))
-        };
-        scenes.into_iter().map(RawValue::get).filter(|scene| lacks_nodes(scene)).map(complete).collect()
+            changes.push((inside..inside, format!("{NO_NODES}{}", if is_empty { "" } else { "," })));
+        }
+        changes
     }
 
-    /// Where a part of the text stands in it.
+    /// Where a part of the text stands in it: the parts are no copies.
     fn range(&self, part: &str) -> Range<usize> {
         let start = part.as_ptr() as usize - self.json.as_ptr() as usize;
         start..start + part.len()
     }
+}
+
+/// Whether this is a scene without a list of nodes.
+fn lacks_nodes(scene: &str) -> bool {
+    #[derive(Deserialize)]
+    struct Scene {
+        nodes: Option<IgnoredAny>,
+    }
+    scene.starts_with('{') && serde_json::from_str(scene).is_ok_and(|scene: Scene| scene.nodes.is_none())
 }
 
 #[cfg(test)]

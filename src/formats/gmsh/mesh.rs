@@ -31,39 +31,53 @@ pub fn write(out: &mut Binary, charts: &[CertifiedChart], linear: &LinearAtlas, 
 
 /// The blocks of points, curves and surfaces, and the number of each node of the atlas, from 1 in their order.
 fn blocks(charts: &[CertifiedChart], linear: &LinearAtlas, network: &SeamNetwork) -> (Vec<Block>, Vec<u64>) {
-    let mut number = vec![0; linear.points().len()];
-    let mut last = 0;
-    let mut block = |dimension, entity, kind, elements: Vec<u32>| {
-        let mut nodes = Vec::new();
-        for n in &elements {
-            if number[*n as usize] == 0 {
-                last += 1;
-                number[*n as usize] = last;
-                nodes.push(*n);
-            }
-        }
-        Block { dimension, entity, kind, nodes, elements }
-    };
     let mut blocks = Vec::new();
     for (entity, node) in super::point_nodes(linear, network).into_iter().enumerate() {
-        blocks.push(block(0, entity, POINT, vec![node]));
+        blocks.push(Block { dimension: 0, entity, kind: POINT, nodes: Vec::new(), elements: vec![node] });
     }
     for curve in network.curves() {
-        blocks.push(block(1, curve.id().index(), LINE, lines(curve, charts, linear)));
+        let elements = lines(curve, charts, linear);
+        blocks.push(Block { dimension: 1, entity: curve.id().index(), kind: LINE, nodes: Vec::new(), elements });
     }
-    for (entity, (chart, l)) in charts.iter().zip(linear.charts()).enumerate() {
-        let corners = chart.chart().triangles().iter().flatten().map(|v| l.nodes()[v.index()]);
-        blocks.push(block(2, entity, TRIANGLE, corners.collect()));
+    for (entity, (chart, linear)) in charts.iter().zip(linear.charts()).enumerate() {
+        let corners = chart.chart().triangles().iter().flatten();
+        let elements = corners.map(|vertex| linear.nodes()[vertex.index()]).collect();
+        blocks.push(Block { dimension: 2, entity, kind: TRIANGLE, nodes: Vec::new(), elements });
     }
+    let number = give_nodes(&mut blocks, linear.points().len());
     (blocks, number)
+}
+
+/// Gives each node to the first block that has it: blocks ascend in dimension, so that is the entity of the lowest one.
+/// The number of each node, from 1 in the order in which they are given; 0 for those of no element.
+fn give_nodes(blocks: &mut [Block], count: usize) -> Vec<u64> {
+    let mut number = vec![0; count];
+    let mut last = 0;
+    for block in blocks {
+        for node in &block.elements {
+            if number[*node as usize] == 0 {
+                last += 1;
+                number[*node as usize] = last;
+                block.nodes.push(*node);
+            }
+        }
+    }
+    number
 }
 
 /// The edges of the surface along a curve.
 fn lines(curve: &Curve, charts: &[CertifiedChart], linear: &LinearAtlas) -> Vec<u32> {
+    // All sides run along the same edges: any of them will do.
     let side = &curve.sides()[0];
-    let (chart, l) = (charts[side.chart.index()].chart(), &linear.charts()[side.chart.index()]);
-    let node = |h| l.nodes()[chart.from(h).index()];
-    side.half_edges.iter().flat_map(|h| [node(*h), node(h.next())]).collect()
+    let chart = charts[side.chart.index()].chart();
+    let nodes = linear.charts()[side.chart.index()].nodes();
+    let mut lines = Vec::with_capacity(2 * side.half_edges.len());
+    for half_edge in &side.half_edges {
+        for end in [*half_edge, half_edge.next()] {
+            lines.push(nodes[chart.from(end).index()]);
+        }
+    }
+    lines
 }
 
 fn nodes(out: &mut Binary, blocks: &[Block], linear: &LinearAtlas) {
@@ -76,19 +90,18 @@ fn nodes(out: &mut Binary, blocks: &[Block], linear: &LinearAtlas) {
         // Not parametric: other readers stumble over parameters, and remeshing does not use them.
         out.int(0);
         out.size(block.nodes.len());
-        (1..=block.nodes.len()).for_each(|i| out.size(last + i));
-        last += block.nodes.len();
-        block.nodes.iter().for_each(|n| out.point(linear.points()[*n as usize]));
+        for _ in &block.nodes {
+            last += 1;
+            out.size(last);
+        }
+        for node in &block.nodes {
+            out.point(linear.points()[*node as usize]);
+        }
     }
 }
 
 fn elements(out: &mut Binary, blocks: &[Block], number: &[u64]) {
-    let corners = |kind| match kind {
-        POINT => 1,
-        LINE => 2,
-        _ => 3,
-    };
-    let total = blocks.iter().map(|b| b.elements.len() / corners(b.kind)).sum();
+    let total = blocks.iter().map(|block| block.elements.len() / corners(block.kind)).sum();
     header(out, blocks.len(), total);
     let mut last = 0;
     for block in blocks {
@@ -99,12 +112,25 @@ fn elements(out: &mut Binary, blocks: &[Block], number: &[u64]) {
         for element in block.elements.chunks_exact(corners(block.kind)) {
             last += 1;
             out.size(last);
-            element.iter().for_each(|n| out.size(number[*n as usize] as usize));
+            for node in element {
+                out.size(number[*node as usize] as usize);
+            }
         }
+    }
+}
+
+/// How many nodes an element of this kind has.
+fn corners(kind: i32) -> usize {
+    match kind {
+        POINT => 1,
+        LINE => 2,
+        _ => 3,
     }
 }
 
 /// Number of blocks and of entries, least and largest tag.
 fn header(out: &mut Binary, blocks: usize, total: usize) {
-    [blocks, total, 1, total].into_iter().for_each(|n| out.size(n));
+    for number in [blocks, total, 1, total] {
+        out.size(number);
+    }
 }

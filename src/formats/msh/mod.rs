@@ -305,9 +305,13 @@ fn body<'a, 'n, V: Values<'a>>(
             })?;
         }
     }
-    let none = |section| MshError::NoSection { section, late: false };
-    let surface = found.surface.ok_or_else(|| none(if found.nodes.is_some() { "Elements" } else { "Nodes" }))?;
-    Ok((surface, notes))
+    match found.surface {
+        Some(surface) => Ok((surface, notes)),
+        None => {
+            let section = if found.nodes.is_some() { "Elements" } else { "Nodes" };
+            Err(MshError::NoSection { section, late: false }.into())
+        }
+    }
 }
 
 impl<'n> Found<'n> {
@@ -321,6 +325,7 @@ impl<'n> Found<'n> {
         notes: &mut Notes,
     ) -> Result<(), SectionError> {
         match (name, version) {
+            // Once there is a surface, it has taken the nodes.
             (b"Nodes" | b"ParametricNodes", _) if self.nodes.is_some() || self.surface.is_some() => {
                 return Err(second(name, values));
             }
@@ -367,10 +372,13 @@ fn end_section<'a>(values: &mut impl Values<'a>, name: &[u8]) -> Result<(), MshE
 
 /// The names of physical groups: in each line one, between quotes.
 fn names(section: &[u8], notes: &mut Notes) {
-    for line in section.split(|b| *b == b'\n') {
-        let quotes = |b: &u8| *b == b'"';
-        let (first, last) = (line.iter().position(quotes), line.iter().rposition(quotes));
-        if let Some((first, last)) = first.zip(last).filter(|(first, last)| first < last) {
+    for line in section.split(|byte| *byte == b'\n') {
+        let first = line.iter().position(|byte| *byte == b'"');
+        let last = line.iter().rposition(|byte| *byte == b'"');
+        // One alone is both.
+        if let (Some(first), Some(last)) = (first, last)
+            && first < last
+        {
             notes.name(&String::from_utf8_lossy(&line[first + 1..last]));
         }
     }

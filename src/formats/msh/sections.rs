@@ -12,9 +12,10 @@ use planish_core::vec3::Vec3;
 
 /// Checks that so many records can be there, of so many bytes each at least.
 fn fits<'a, V: Values<'a>>(values: &V, what: &'static str, count: u64, bytes: u64, most: u64) -> Result<(), MshError> {
-    let (needed, left, location) = (count.saturating_mul(bytes), values.left(), values.location());
+    let needed = count.saturating_mul(bytes);
+    let left = values.left();
     if needed > left {
-        return Err(MshError::Count { what, count, needed, left, location });
+        return Err(MshError::Count { what, count, needed, left, location: values.location() });
     }
     Ok(TooMany::check(what, count, most)?)
 }
@@ -50,10 +51,10 @@ impl Growing {
 /// How many numbers follow the coordinates of a node that lies on something of this dimension, where its parameters
 /// are told.
 fn parameters(dimension: i64) -> Result<u64, SectionError> {
-    u64::try_from(dimension)
-        .ok()
-        .filter(|d| *d <= 3)
-        .ok_or_else(|| SectionError::Value(format!("{dimension} is no dimension (0 to 3)")))
+    match u64::try_from(dimension) {
+        Ok(dimension) if dimension <= 3 => Ok(dimension),
+        _ => Err(SectionError::Value(format!("{dimension} is no dimension (0 to 3)"))),
+    }
 }
 
 /// `$Nodes` of MSH 2, or `$ParametricNodes`.
@@ -88,6 +89,7 @@ pub fn nodes_4_1<'a, V: Values<'a>>(values: &mut V, limits: &Limits) -> Result<N
         let numbers = if parametric == 0 { 0 } else { parameters(dimension)? };
         let block = values.size()?;
         within(values, "nodes", block, count - nodes.tags.len() as u64, count)?;
+        // All tags of a block stand before the coordinates of the first of its nodes.
         let first = nodes.tags.len();
         for _ in 0..block {
             nodes.tags.push(values.size()?);
@@ -141,6 +143,7 @@ fn all<'a, V: Values<'a>>(values: &V, what: &'static str, found: u64, count: u64
     if found == count { Ok(()) } else { Err(MshError::Sum { what, count, found, location: values.location() }) }
 }
 
+/// The shape of elements of the type with this number.
 fn shape<'a, V: Values<'a>>(values: &V, number: i64) -> Result<Shape, MshError> {
     Shape::of(number).ok_or_else(|| MshError::NoType { number, location: values.location() })
 }

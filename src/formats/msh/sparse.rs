@@ -8,7 +8,8 @@
 use super::MshError;
 use super::nodes::NONE;
 
-/// More tags in one bucket are a crowd.
+/// More tags in one bucket are a crowd. By experience: with fewer, harmless clumps would be scattered over memory; with more,
+/// finding a tag takes more steps.
 const CROWD: u32 = 16;
 
 /// The golden ratio, of 2^64: scatters what lies close together.
@@ -43,7 +44,9 @@ impl Scatter {
     /// How many tags each bucket gets.
     fn counts(self, tags: &[u64], buckets: usize) -> Vec<u32> {
         let mut counts = vec![0; buckets];
-        tags.iter().for_each(|tag| counts[self.bucket(*tag)] += 1);
+        for tag in tags {
+            counts[self.bucket(*tag)] += 1;
+        }
         counts
     }
 }
@@ -54,7 +57,9 @@ impl Sparse {
         let first = tags.iter().copied().min().unwrap_or(0);
         let span = tags.iter().copied().max().unwrap_or(0) - first;
         let bits = tags.len().max(2).next_power_of_two().ilog2();
-        let mut scatter = Scatter { first, factor: 1, shift: (u64::BITS - span.leading_zeros()).saturating_sub(bits) };
+        // The highest bits of the distance from the first tag tell the bucket.
+        let shift = (u64::BITS - span.leading_zeros()).saturating_sub(bits);
+        let mut scatter = Scatter { first, factor: 1, shift };
         let mut counts = scatter.counts(&tags, 1 << bits);
         if counts.iter().any(|count| *count > CROWD) {
             scatter = Scatter { first, factor: GOLDEN, shift: u64::BITS - bits };
@@ -108,6 +113,7 @@ impl Sparse {
     /// Adds the positions of tags, [`NONE`] for those that are not there. Memory is slow to reach, so all is asked for
     /// before anything is looked at; and most buckets have one node or two.
     pub fn find_all(&self, tags: &[u64], found: &mut Vec<u32>) {
+        // A tag far beyond the last one has no bucket: it is looked for in the first, in vain.
         let start = |tag: &u64| self.starts.get(self.scatter.bucket(*tag)).map_or(0, |start| *start as usize);
         let starts: Vec<usize> = tags.iter().map(start).collect();
         let near: Vec<[u32; 2]> = starts.iter().map(|at| [self.nodes[*at], self.nodes[*at + 1]]).collect();

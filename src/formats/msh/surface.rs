@@ -28,6 +28,17 @@ pub struct Surface<'n> {
     pub limits: &'n Limits,
 }
 
+/// The new number of each node when those in the middle are left out, whose own is never asked for.
+fn numbers_without(mids: &[bool]) -> Vec<u32> {
+    let mut numbers = Vec::with_capacity(mids.len());
+    let mut kept = 0;
+    for is_mid in mids {
+        numbers.push(kept);
+        kept += u32::from(!*is_mid);
+    }
+    numbers
+}
+
 /// What meshes tell of a triangle beside its corners.
 #[derive(Default)]
 struct Kept {
@@ -83,7 +94,10 @@ impl<'n> Surface<'n> {
                 corners[i] = found;
             } else {
                 self.mark(found);
-                mids.get_mut(i - count).into_iter().for_each(|mid| *mid = found);
+                // Elements of higher order have more of them, which nobody asks for.
+                if let Some(mid) = mids.get_mut(i - count) {
+                    *mid = found;
+                }
             }
         }
         self.face(&corners[..count]);
@@ -134,19 +148,20 @@ impl<'n> Surface<'n> {
         let Nodes { mut points, mut bad, .. } = nodes;
         if !mids.is_empty() {
             // What is a corner anywhere stays.
-            triangles.iter().flatten().for_each(|corner| mids[*corner as usize] = false);
+            for corner in triangles.iter().flatten() {
+                mids[*corner as usize] = false;
+            }
             notes.mid_nodes = mids.iter().filter(|mid| **mid).count();
-            let mut kept = 0;
-            let number = |mid: &bool| {
-                kept += u32::from(!*mid);
-                // That of nodes in the middle is never asked for.
-                kept.saturating_sub(1)
-            };
-            let numbers: Vec<u32> = mids.iter().map(number).collect();
+            let numbers = numbers_without(&mids);
             let mut left_out = mids.iter();
             points.retain(|_| left_out.next() != Some(&true));
-            triangles.iter_mut().for_each(|t| *t = t.map(|node| numbers[node as usize]));
-            bad.0.retain_mut(|(node, _)| !mids[std::mem::replace(node, numbers[*node] as usize)]);
+            for triangle in &mut triangles {
+                *triangle = triangle.map(|node| numbers[node as usize]);
+            }
+            bad.0.retain(|(node, _)| !mids[*node]);
+            for (node, _) in &mut bad.0 {
+                *node = numbers[*node] as usize;
+            }
         }
         finish::content(points, triangles, notes, &bad)
     }

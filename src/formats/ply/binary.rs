@@ -21,8 +21,8 @@ impl<'a> Binary<'a> {
     }
 
     fn take(&mut self, bytes: u64) -> Result<&'a [u8], ValueError> {
-        let (taken, rest) =
-            usize::try_from(bytes).ok().and_then(|n| self.rest.split_at_checked(n)).ok_or(ValueError::End)?;
+        let count = usize::try_from(bytes).map_err(|_| ValueError::End)?;
+        let (taken, rest) = self.rest.split_at_checked(count).ok_or(ValueError::End)?;
         self.rest = rest;
         Ok(taken)
     }
@@ -88,13 +88,15 @@ impl Plain {
     /// Whether the faces of an element can be plain, with their list in a property.
     pub fn new(element: &Element, list: usize, points: usize) -> Option<Self> {
         let property = &element.properties[list];
-        let size =
-            |of: &[Property]| -> Option<usize> { of.iter().map(|p| p.count.is_none().then(|| p.scalar.size())).sum() };
-        let (before, after) = (size(&element.properties[..list])?, size(&element.properties[list + 1..])?);
+        let before = size_without_lists(&element.properties[..list])?;
+        let after = size_without_lists(&element.properties[list + 1..])?;
+        let count = property.count.map(Scalar::size).filter(|size| [1, 4].contains(size))?;
+        if ![Scalar::I32, Scalar::U32].contains(&property.scalar) {
+            return None;
+        }
         // Indices below 2^31 are the same in both types.
         let points = u32::try_from(points.min(i32::MAX as usize)).ok()?;
-        let count = property.count.map(Scalar::size).filter(|size| [1, 4].contains(size))?;
-        [Scalar::I32, Scalar::U32].contains(&property.scalar).then_some(Self { before, after, count, points })
+        Some(Self { before, after, count, points })
     }
 
     /// Gives the corners at the front of a list, if they are in range and the record is whole: what follows it.
@@ -112,6 +114,18 @@ impl Plain {
         give(&corners);
         Some(rest)
     }
+}
+
+/// The bytes that these properties take in each record; none where one of them is a list.
+pub fn size_without_lists(properties: &[Property]) -> Option<usize> {
+    let mut size = 0;
+    for property in properties {
+        if property.count.is_some() {
+            return None;
+        }
+        size += property.scalar.size();
+    }
+    Some(size)
 }
 
 /// Records of equal size.
@@ -134,20 +148,25 @@ impl Table<'_> {
         match columns.map(|c| c.1) {
             [Scalar::F32, Scalar::F32, Scalar::F32] => self.decode(at, |b| f64::from(f32::from_le_bytes(b))),
             [Scalar::F64, Scalar::F64, Scalar::F64] => self.decode(at, f64::from_le_bytes),
+            // Any others, and mixtures: rare, so they may take longer.
             _ => {
-                let value = |record: &[u8], (at, scalar): (usize, Scalar)| {
-                    let mut value = Binary { rest: &record[at..], end: 0, big: self.big };
-                    // The record is whole, so there is a value.
-                    value.float(scalar).unwrap_or(f64::NAN)
-                };
-                self.bytes.chunks_exact(self.stride).map(|record| columns.map(|c| value(record, c))).collect()
+                let records = self.bytes.chunks_exact(self.stride);
+                records.map(|record| columns.map(|(at, scalar)| self.value(&record[at..], scalar))).collect()
             }
         }
+    }
+
+    /// The value at the front of what is left of a record.
+    fn value(&self, rest: &[u8], scalar: Scalar) -> f64 {
+        let mut value = Binary { rest, end: 0, big: self.big };
+        // The record is whole, so there is a value.
+        value.float(scalar).unwrap_or(f64::NAN)
     }
 
     fn decode<const N: usize>(&self, at: [usize; 3], value: impl Fn([u8; N]) -> f64) -> Vec<[f64; 3]> {
         let array = |record: &[u8], at: usize| std::array::from_fn(|i| record[at + i]);
         let records = self.bytes.chunks_exact(self.stride);
+        // The order is asked for once, not at every number.
         if self.big {
             records.map(|record| at.map(|at| value(ordered(array(record, at), true)))).collect()
         } else {

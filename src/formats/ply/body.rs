@@ -56,7 +56,9 @@ impl<'h> Body<'h> {
             }
         }
         end(values)?;
-        waiting.into_iter().try_for_each(|(element, mut values)| body.surface(element, &mut values))?;
+        for (element, mut values) in waiting {
+            body.surface(element, &mut values)?;
+        }
         Ok(body)
     }
 
@@ -67,22 +69,21 @@ impl<'h> Body<'h> {
         }
         let mut left = size as u64;
         for element in &header.elements {
-            let (name, count, line) = (element.name.clone(), element.count, element.line);
-            // The last value of a text needs no blank after it.
             let needed = element.needed(header.encoding);
-            left = left
-                .checked_add(1)
-                .and_then(|l| l.checked_sub(needed))
-                .map(|l| l.saturating_sub(1))
-                .ok_or(PlyError::Count { element: name.clone(), count, needed, left, line })?;
-            TooMany::check(&format!("{name} elements"), count, self.limits.elements)?;
+            // The last value of a text needs no blank after it: one byte may be missing.
+            if needed > left.saturating_add(1) {
+                let (name, count, line) = (element.name.clone(), element.count, element.line);
+                return Err(PlyError::Count { element: name, count, needed, left, line });
+            }
+            left = left.saturating_sub(needed);
+            TooMany::check(&format!("{} elements", element.name), element.count, self.limits.elements)?;
         }
         Ok(())
     }
 
     /// Reads faces or strips.
     fn surface<'a>(&mut self, element: &Element, values: &mut impl Values<'a>) -> Result<(), PlyError> {
-        let list = element.property(&CORNERS).filter(|p| element.properties[*p].count.is_some());
+        let list = element.property(&CORNERS).filter(|at| element.properties[*at].count.is_some());
         let Some(list) = list else {
             if element.count == 0 {
                 return Ok(());
@@ -95,6 +96,7 @@ impl<'h> Body<'h> {
         let mut corners = Vec::new();
         let mut number = 0;
         while number < element.count {
+            // As many as are plain, quickly; then the next one with care, which tells what is wrong with it; and so on.
             if let Some((binary, plain)) = values.binary().zip(plain) {
                 // Each gives two triangles at most.
                 let room = self.limits.elements.saturating_sub(self.triangles.len() as u64) / 2;
@@ -230,7 +232,9 @@ fn read_points<'a>(element: &Element, values: &mut impl Values<'a>) -> Result<(V
     if let Some(table) = values.binary().and_then(|binary| binary.table(element)) {
         let offset = |axis: usize| element.properties[..axis].iter().map(|p| p.scalar.size()).sum();
         let points = table.vectors(axes.map(|a| (offset(a), element.properties[a].scalar)));
-        points.iter().enumerate().for_each(|(number, point)| bad.check(number, point, || table.location(number)));
+        for (number, point) in points.iter().enumerate() {
+            bad.check(number, point, || table.location(number));
+        }
         return Ok((points, bad));
     }
     // Each point takes at least three bytes, which were counted.

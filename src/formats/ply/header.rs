@@ -1,11 +1,13 @@
 //! The header of a PLY file: which elements there are, and what each of them holds.
 
 use super::PlyError;
+use super::binary::size_without_lists;
 use crate::formats::location::escape;
 pub use crate::formats::scalar::Scalar;
 use crate::formats::words::Words;
 
-/// Bytes of a header, elements, and properties of each, at most.
+/// Bytes of a header, elements, and properties of each, at most: far above what programs write, and little enough that
+/// looking for equal names, each among all others, takes no time.
 const HEADER: usize = 1 << 20;
 const ELEMENTS: usize = 100;
 const PROPERTIES: usize = 1000;
@@ -68,14 +70,21 @@ impl Element {
 
     /// Bytes of each record of a binary file, where there are no lists.
     pub fn stride(&self) -> Option<usize> {
-        self.properties.iter().map(|p| p.count.is_none().then(|| p.scalar.size())).sum()
+        size_without_lists(&self.properties)
     }
 
     /// Bytes that all records take at least.
     pub fn needed(&self, encoding: Encoding) -> u64 {
-        // In text, a digit and a blank each.
-        let size = |p: &Property| if encoding == Encoding::Ascii { 2 } else { p.count.unwrap_or(p.scalar).size() };
-        self.count.saturating_mul(self.properties.iter().map(size).sum::<usize>() as u64)
+        let mut record = 0;
+        for property in &self.properties {
+            record += match encoding {
+                // A digit and a blank.
+                Encoding::Ascii => 2,
+                // A list may be empty: then there is its length alone.
+                Encoding::Little | Encoding::Big => property.count.unwrap_or(property.scalar).size(),
+            };
+        }
+        self.count.saturating_mul(record as u64)
     }
 }
 

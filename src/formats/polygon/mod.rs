@@ -14,7 +14,8 @@ mod tree;
 use planish_core::vec3::{Vec3, cross, dot, sub};
 use tree::Tree;
 
-/// Looks per corner of a polygon, at most.
+/// Looks per corner of a polygon, at most. It bounds the time that a file made for that can take; with fewer, more
+/// intricate polygons would be cut up unseen.
 const LOOKS: usize = 150;
 
 /// Cuts the polygon with these corner indices, all of which must be in range, into triangles. Where there is no ear, a
@@ -58,18 +59,25 @@ fn is_convex([a, b, c, d]: [Vec3; 4]) -> bool {
 
 /// Twice the vector area (Newell).
 fn normal(corners: &[u32], points: &[Vec3]) -> Vec3 {
-    let relative = |i: u32| sub(points[i as usize], points[corners[0] as usize]);
-    let areas = corners[1..].windows(2).map(|edge| cross(relative(edge[0]), relative(edge[1])));
-    areas.fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
+    // From the first corner, not from the origin, which may be far away: then the sum would be rounding alone.
+    let origin = points[corners[0] as usize];
+    let mut sum = [0.0; 3];
+    for edge in corners[1..].windows(2) {
+        let [p, q] = [edge[0], edge[1]].map(|corner| sub(points[corner as usize], origin));
+        let area = cross(p, q);
+        sum = [sum[0] + area[0], sum[1] + area[1], sum[2] + area[2]];
+    }
+    sum
 }
 
 /// Whether the fan does not fold: each of its triangles turns left, and none lies beyond the line of the first edge,
 /// so that they cannot wind around the last corner.
 fn is_seen_from_last(corners: &[u32], points: &[Vec3], normal: Vec3) -> bool {
-    let place = |i: usize| points[corners[i] as usize];
-    let last = place(corners.len() - 1);
+    let at = |i: usize| points[corners[i] as usize];
+    let last = at(corners.len() - 1);
+    // Positive where the triangle from the last corner over p to q turns left, as the whole polygon does.
     let turn = |p: Vec3, q: Vec3| dot(cross(sub(p, last), sub(q, last)), normal);
-    (1..corners.len() - 1).all(|i| turn(place(i - 1), place(i)) > 0.0 && turn(place(0), place(i)) > 0.0)
+    (1..corners.len() - 1).all(|i| turn(at(i - 1), at(i)) > 0.0 && turn(at(0), at(i)) > 0.0)
 }
 
 /// A corner in the plane.
@@ -157,6 +165,7 @@ impl<'a> Ears<'a> {
     fn round(&mut self, tried: &[u32], go: impl Fn(&mut Self, u32) -> bool) -> Vec<u32> {
         let mut changed: Vec<u32> = Vec::new();
         for i in tried.iter().copied() {
+            // Its neighbour has just been cut off: it waits for the next round.
             let waits = changed.last() == Some(&i);
             if self.left > 3 && !waits && self.is_left(i) && go(self, i) {
                 let [before, after] = self.take(i);
@@ -171,8 +180,13 @@ impl<'a> Ears<'a> {
 
     /// The corners that are left.
     fn ring(&self) -> Vec<u32> {
-        let after = |i: &u32| Some(self.next[*i as usize]);
-        std::iter::successors(Some(self.one), after).take(self.left).collect()
+        let mut ring = Vec::with_capacity(self.left);
+        let mut corner = self.one;
+        for _ in 0..self.left {
+            ring.push(corner);
+            corner = self.next[corner as usize];
+        }
+        ring
     }
 
     fn around(&self, i: u32) -> [u32; 3] {
@@ -190,6 +204,7 @@ impl<'a> Ears<'a> {
         [before, after]
     }
 
+    /// Whether a corner was not cut off: then the one before it still leads to it.
     fn is_left(&self, i: u32) -> bool {
         self.next[self.previous[i as usize] as usize] == i
     }
@@ -234,12 +249,23 @@ impl<'a> Ears<'a> {
 /// The corners as seen along the axis that is closest to the normal, turning left on the whole.
 fn flat(corners: &[u32], points: &[Vec3], normal: Vec3) -> Vec<Flat> {
     let size = normal.map(f64::abs);
-    let axis = (0..3).fold(0, |best, k| if size[k] > size[best] { k } else { best });
+    let mut axis = 0;
+    for k in 1..3 {
+        if size[k] > size[axis] {
+            axis = k;
+        }
+    }
     let (mut u, mut v) = ((axis + 1) % 3, (axis + 2) % 3);
     if normal[axis] < 0.0 {
+        // Seen from the other side.
         (u, v) = (v, u);
     }
-    corners.iter().map(|c| points[*c as usize]).map(|p| [p[u], p[v]]).collect()
+    let mut flat = Vec::with_capacity(corners.len());
+    for corner in corners {
+        let point = points[*corner as usize];
+        flat.push([point[u], point[v]]);
+    }
+    flat
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ pub(super) struct Tree {
 /// The positions of a tree in the list.
 type Branch = (usize, usize);
 
+/// The branch before the root of a tree, the root, and the branch behind it.
 fn halves((from, to): Branch) -> (Branch, usize, Branch) {
     let root = from + (to - from) / 2;
     ((from, root), root, (root + 1, to))
@@ -29,9 +30,12 @@ impl Tree {
             }
             let around = around(&points[branch.0..branch.1]);
             let (before, root, after) = halves(branch);
-            let k = usize::from(around[1][1] - around[0][1] > around[1][0] - around[0][0]);
-            let order = |a: &(Flat, u32), b: &(Flat, u32)| a.0[k].total_cmp(&b.0[k]).then(a.1.cmp(&b.1));
-            points[branch.0..branch.1].select_nth_unstable_by(root - branch.0, order);
+            // Across the longer side of the box; equal coordinates in the order of their numbers, so that the tree does not
+            // depend on how the library selects.
+            let [width, height] = [0, 1].map(|k| around[1][k] - around[0][k]);
+            let k = usize::from(height > width);
+            points[branch.0..branch.1]
+                .select_nth_unstable_by(root - branch.0, |(p, i), (q, j)| p[k].total_cmp(&q[k]).then(i.cmp(j)));
             boxes[root] = around;
             waiting.extend([before, after]);
         }
@@ -70,9 +74,15 @@ impl Tree {
 
 /// The box around points.
 fn around(points: &[(Flat, u32)]) -> [Flat; 2] {
-    points.iter().fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], (p, _)| {
-        [[low[0].min(p[0]), low[1].min(p[1])], [high[0].max(p[0]), high[1].max(p[1])]]
-    })
+    let mut low = [f64::INFINITY; 2];
+    let mut high = [f64::NEG_INFINITY; 2];
+    for (point, _) in points {
+        for k in 0..2 {
+            low[k] = low[k].min(point[k]);
+            high[k] = high[k].max(point[k]);
+        }
+    }
+    [low, high]
 }
 
 /// Whether a box lies to the right of a line, in every digit: rounding keeps the order of numbers, so what is computed for

@@ -135,9 +135,10 @@ impl<'a> Stream<'a> {
         let word: u64 = if packing.wide { 8 } else { 4 };
         let size = count.saturating_mul(word);
         let bytes = self.take(size)?;
+        // The highest byte first: each shifts those before it.
         let number = |word: &[u8]| match packing.order {
-            Order::Big => word.iter().fold(0, |n, b| n << 8 | u64::from(*b)),
-            Order::Little => word.iter().rfold(0, |n, b| n << 8 | u64::from(*b)),
+            Order::Big => word.iter().fold(0, |number, byte| number << 8 | u64::from(*byte)),
+            Order::Little => word.iter().rfold(0, |number, byte| number << 8 | u64::from(*byte)),
         };
         Ok(bytes.chunks_exact(word as usize).map(number).collect())
     }
@@ -154,7 +155,8 @@ impl Base64<'_> {
             if run.is_empty() {
                 return Err(PackedError::Short { needed: size as u64, there: bytes.len() as u64 });
             }
-            // A run ends with its padding, and another one may follow.
+            // A run ends with its padding, and another one may follow. (`contains` is quick where there is none, as nearly
+            // always.)
             let run = match run.contains(&b'=').then(|| run.iter().position(|b| *b == b'=')).flatten() {
                 Some(padding) => &run[..((padding / 4 + 1) * 4).min(run.len())],
                 None => run,
@@ -201,11 +203,12 @@ pub(super) fn unpack<'a>(
     for (block, packed) in header.sizes.iter().enumerate() {
         let packed = stream.take(*packed)?;
         let before = bytes.len();
-        unpacker.block(&packed, header.size_of(block), block, &mut bytes).or_else(|damaged| {
-            bytes.truncate(before);
-            let is_empty = header.may_end_with_nothing(block) && unpacker.block(&packed, 0, block, &mut bytes).is_ok();
-            if is_empty { Ok(()) } else { Err(damaged) }
-        })?;
+        let Err(damaged) = unpacker.block(&packed, header.size_of(block), block, &mut bytes) else { continue };
+        bytes.truncate(before);
+        let is_empty = header.may_end_with_nothing(block) && unpacker.block(&packed, 0, block, &mut bytes).is_ok();
+        if !is_empty {
+            return Err(damaged);
+        }
     }
     Ok(Cow::Owned(bytes))
 }
@@ -227,12 +230,14 @@ struct Header {
 impl Header {
     fn read(stream: &mut Stream, packing: Packing) -> Result<Self, PackedError> {
         let header = stream.sizes(3, packing)?;
-        let (blocks, block) = (header[0], header[1]);
-        let untold = header[2] == 0;
-        let last = if untold { block } else { header[2] };
+        let (blocks, block, told) = (header[0], header[1], header[2]);
+        let untold = told == 0;
+        let last = if untold { block } else { told };
         let sizes = stream.sizes(blocks, packing)?;
         let packed = sizes.iter().fold(0, |sum: u64, size| sum.saturating_add(*size));
-        let unpacked = blocks.saturating_sub(1).saturating_mul(block).saturating_add(if blocks > 0 { last } else { 0 });
+        // Sizes may be any numbers: what does not fit into 64 bits is too much in any case.
+        let all_but_last = blocks.saturating_sub(1).saturating_mul(block);
+        let unpacked = all_but_last.saturating_add(if blocks > 0 { last } else { 0 });
         if packed > stream.len() {
             return Err(PackedError::Short { needed: packed, there: stream.len() });
         }

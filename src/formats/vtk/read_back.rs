@@ -88,31 +88,39 @@ impl Columns<'_, '_> {
 
     /// The nodes of the cells, all of which must be 6-node triangles of existing points.
     fn cells(&mut self, points: u64, count: u64) -> Result<Vec<[u32; 6]>, VtuError> {
-        let wrong = || VtuError::Content("Cells");
         let types = self.numbers(Role::Types, "Cells", Scalar::U8, count, u8::from_le_bytes)?;
         let ends = self.numbers(Role::Offsets(Section::Cells), "Cells", Scalar::U64, count, u64::from_le_bytes)?;
-        let sixes = ends.into_iter().zip(1..).all(|(end, i)| end == 6 * i);
-        let quadratic = types.into_iter().all(|t| t == cell::QUADRATIC_TRIANGLE);
-        let all = count.checked_mul(6).filter(|_| sixes && quadratic).ok_or_else(wrong)?;
-        // What is no node is the largest number: a file has fewer points.
-        let node = |bytes| u32::try_from(u64::from_le_bytes(bytes)).unwrap_or(u32::MAX);
+        let are_sixes = ends.into_iter().zip(1..).all(|(end, i)| end == 6 * i);
+        let are_quadratic = types.into_iter().all(|kind| kind == cell::QUADRATIC_TRIANGLE);
+        let Some(all) = count.checked_mul(6).filter(|_| are_sixes && are_quadratic) else {
+            return Err(VtuError::Content("Cells"));
+        };
         let nodes = self.numbers(Role::Connectivity(Section::Cells), "Cells", Scalar::U64, all, node)?;
-        let largest = u64::from(nodes.iter().copied().max().unwrap_or_default());
-        if largest < points || nodes.is_empty() { Ok(nodes.as_chunks().0.to_vec()) } else { Err(wrong()) }
+        if nodes.iter().any(|node| u64::from(*node) >= points) {
+            return Err(VtuError::Content("Cells"));
+        }
+        Ok(nodes.as_chunks().0.to_vec())
     }
 
     fn fields(&mut self, count: u64) -> Result<Vec<CellFields>, VtuError> {
         let mut field = |name| self.doubles::<1>(Role::Field(Field::OfCells(name)), name, count);
-        let (min, max, ratio) = (field("det_min")?, field("det_max")?, field("jacobian_ratio")?);
-        let (distortion, scale) = (field("conformal_distortion")?, field("area_scale")?);
-        let all = (0..min.len()).map(|i| CellFields {
-            det_min: min[i][0],
-            det_max: max[i][0],
-            jacobian_ratio: ratio[i][0],
-            conformal_distortion: distortion[i][0],
-            area_scale: scale[i][0],
-        });
-        Ok(all.collect())
+        let min = field("det_min")?;
+        let max = field("det_max")?;
+        let ratio = field("jacobian_ratio")?;
+        let distortion = field("conformal_distortion")?;
+        let scale = field("area_scale")?;
+        // Each has `count` numbers: `numbers` gives no other count.
+        let mut fields = Vec::with_capacity(min.len());
+        for i in 0..min.len() {
+            fields.push(CellFields {
+                det_min: min[i][0],
+                det_max: max[i][0],
+                jacobian_ratio: ratio[i][0],
+                conformal_distortion: distortion[i][0],
+                area_scale: scale[i][0],
+            });
+        }
+        Ok(fields)
     }
 
     fn doubles<const N: usize>(
@@ -142,7 +150,14 @@ impl Columns<'_, '_> {
         let array = self.piece.array(role).filter(|array| array.scalar == scalar).ok_or(VtuError::Content(name))?;
         let bytes = self.arrays.bytes_of(&array, name)?;
         let (numbers, rest) = bytes.as_chunks::<SIZE>();
-        let complete = rest.is_empty() && numbers.len() as u64 == count;
-        if complete { Ok(numbers.iter().map(|n| number(*n)).collect()) } else { Err(VtuError::Content(name)) }
+        if !rest.is_empty() || numbers.len() as u64 != count {
+            return Err(VtuError::Content(name));
+        }
+        Ok(numbers.iter().map(|bytes| number(*bytes)).collect())
     }
+}
+
+/// A node by its bytes. What is no node is the largest number: a file has fewer points.
+fn node(bytes: [u8; 8]) -> u32 {
+    u32::try_from(u64::from_le_bytes(bytes)).unwrap_or(u32::MAX)
 }

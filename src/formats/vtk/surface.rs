@@ -43,9 +43,16 @@ pub(super) struct Surface<'a> {
 
 impl<'a> Surface<'a> {
     pub fn new(limits: &'a Limits, format: String) -> Self {
-        let notes = Notes::new(format);
-        let (points, triangles, mid_nodes, scratch) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { limits, notes, points, triangles, base: 0, mid_nodes, skipped: [0; 256], scratch }
+        Self {
+            limits,
+            notes: Notes::new(format),
+            points: Vec::new(),
+            triangles: Vec::new(),
+            base: 0,
+            mid_nodes: Vec::new(),
+            skipped: [0; 256],
+            scratch: Vec::new(),
+        }
     }
 
     /// How many points there may be.
@@ -65,6 +72,7 @@ impl<'a> Surface<'a> {
             });
         }
         self.base = self.points.len();
+        // Most files have one piece: its points are not copied.
         if self.points.is_empty() {
             self.points = points;
         } else {
@@ -80,6 +88,7 @@ impl<'a> Surface<'a> {
 
     /// Adds the triangles of cells of the piece at hand.
     pub fn add_cells(&mut self, cells: &Cells, location: impl FnOnce() -> Location) -> Result<(), VtkError> {
+        // About one triangle a cell, where they are triangles; what a strip gives is not known.
         if !matches!(cells.types, Types::All(cell::STRIP)) {
             self.triangles.reserve(cells.ends.len().min(cells.corners.len() / 3));
         }
@@ -112,6 +121,7 @@ impl<'a> Surface<'a> {
         match (kind, corners) {
             (Kind::Polygon, [a, b, c]) => self.triangle([*a, *b, *c]),
             (Kind::Polygon, [_, _, _, ..]) => self.polygon(corners),
+            // The corners of a pixel run row by row, not around it.
             (Kind::Pixel, [a, b, c, d]) => self.polygon(&[*a, *b, *d, *c]),
             (Kind::Strip, [_, _, _, ..]) => self.strip(corners),
             (Kind::Curved { corners: count }, _) => self.curved(&corners[..count], &corners[count..]),

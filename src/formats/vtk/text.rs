@@ -34,7 +34,8 @@ impl<'a> Text<'a> {
     pub fn word(&mut self) -> Option<&'a [u8]> {
         self.blanks();
         let rest = self.rest();
-        let word = &rest[..rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len())];
+        let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+        let word = &rest[..end];
         self.at += word.len();
         (!word.is_empty()).then_some(word)
     }
@@ -68,8 +69,10 @@ impl<'a> Text<'a> {
         let mut points = vec![[0.0; 3]; count as usize];
         for (there, coordinate) in (0..).zip(points.as_flattened_mut()) {
             let Some(word) = self.word() else { return Err(self.count(what, declared, there)) };
-            let problem = || format!("\"{}\" is no coordinate of {what}{}", escape(word), remedy(word));
-            *coordinate = float(word).ok_or_else(|| self.syntax(problem()))?;
+            let Some(number) = float(word) else {
+                return Err(self.syntax(format!("\"{}\" is no coordinate of {what}{}", escape(word), remedy(word))));
+            };
+            *coordinate = number;
         }
         Ok(points)
     }

@@ -3,6 +3,7 @@
 use super::vtu::COMPRESSOR;
 use planish_core::mesh::SurfaceMesh;
 use planish_core::seams::{Curve, SeamNetwork};
+use planish_core::topology::VertexId;
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version, VertexNumbers, Vtk,
 };
@@ -21,18 +22,21 @@ pub struct VtpError(String);
 /// # Errors
 /// [`VtpError`].
 pub fn seams(mesh: &SurfaceMesh, network: &SeamNetwork) -> Result<Vec<u8>, VtpError> {
-    let corners: Vec<_> = network.points().iter().filter(|p| p.corner).map(|p| p.vertex).collect();
-    let of_curves = network.curves().iter().flat_map(Curve::vertices).copied();
-    let vertices: Vec<_> = corners.iter().copied().chain(of_curves).collect();
+    // The corners, each once; then the vertices of one curve after the other, shared by none.
+    let mut vertices: Vec<VertexId> = network.points().iter().filter(|p| p.corner).map(|p| p.vertex).collect();
+    let corners = vertices.len();
+    let mut lengths = Vec::new();
+    for curve in network.curves() {
+        vertices.extend(curve.vertices());
+        lengths.push(curve.vertices().len());
+    }
     let points: Vec<f64> = vertices.iter().flat_map(|v| mesh.points()[v.index()]).collect();
-    let numbers: Vec<i32> = vertices.iter().map(|v| mesh.input_vertex(*v).map_or(-2, |w| w as i32)).collect();
-    let ones = vec![1; corners.len()];
-    let lengths: Vec<usize> = network.curves().iter().map(|c| c.vertices().len()).collect();
+    let numbers: Vec<i32> = vertices.iter().map(|v| input_number(mesh, *v)).collect();
     let piece = PolyDataPiece {
         points: points.into(),
-        verts: (!corners.is_empty()).then(|| consecutive(0, &ones)),
-        lines: Some(consecutive(corners.len(), &lengths)),
-        data: Attributes { point: vec![array("vertex", numbers)], cell: cell_fields(network, corners.len()) },
+        verts: (corners > 0).then(|| consecutive(0, &vec![1; corners])),
+        lines: Some(consecutive(corners, &lengths)),
+        data: Attributes { point: vec![array("vertex", numbers)], cell: cell_fields(network, corners) },
         ..PolyDataPiece::default()
     };
     let vtk = Vtk {
@@ -42,21 +46,27 @@ pub fn seams(mesh: &SurfaceMesh, network: &SeamNetwork) -> Result<Vec<u8>, VtpEr
         file_path: None,
         data: DataSet::inline(piece),
     };
-    let library = |e: &dyn std::fmt::Display| VtpError(e.to_string());
     let mut bytes = Vec::new();
-    let file = vtk.try_into_xml_format(COMPRESSOR, 1).map_err(|e| library(&e))?;
-    file.write(&mut bytes).map_err(|e| library(&e))?;
+    let file = vtk.try_into_xml_format(COMPRESSOR, 1).map_err(|e| VtpError(e.to_string()))?;
+    file.write(&mut bytes).map_err(|e| VtpError(e.to_string()))?;
     Ok(bytes)
+}
+
+/// The number of a vertex in the input; -2 for one that was made.
+fn input_number(mesh: &SurfaceMesh, vertex: VertexId) -> i32 {
+    mesh.input_vertex(vertex).map_or(-2, |number| number as i32)
 }
 
 /// Cells of the given numbers of points, which follow each other from point `first` on.
 fn consecutive(first: usize, lengths: &[usize]) -> VertexNumbers {
-    let count: usize = lengths.iter().sum();
-    let ends = lengths.iter().scan(0, |end, length| {
-        *end += *length as u64;
-        Some(*end)
-    });
-    VertexNumbers::XML { connectivity: (first as u64..(first + count) as u64).collect(), offsets: ends.collect() }
+    let mut offsets = Vec::with_capacity(lengths.len());
+    let mut end = 0;
+    for length in lengths {
+        end += *length as u64;
+        offsets.push(end);
+    }
+    let first = first as u64;
+    VertexNumbers::XML { connectivity: (first..first + end).collect(), offsets }
 }
 
 fn array(name: &str, data: impl Into<IOBuffer>) -> Attribute {
@@ -65,18 +75,25 @@ fn array(name: &str, data: impl Into<IOBuffer>) -> Attribute {
 
 /// The fields of the corners, then those of the curves: the order of the cells in PolyData.
 fn cell_fields(network: &SeamNetwork, corners: usize) -> Vec<Attribute> {
-    let whole = |name: &str, of: &dyn Fn(&Curve) -> i32, at_corner: i32| {
-        let data: Vec<i32> = vec![at_corner; corners].into_iter().chain(network.curves().iter().map(of)).collect();
-        array(name, data)
-    };
-    let beside = |c: &Curve, k: usize| c.sides().get(k).map_or(-1, |s| s.chart.0 as i32);
-    let lengths: Vec<f64> = vec![0.0; corners].into_iter().chain(network.curves().iter().map(Curve::length)).collect();
+    let curves = network.curves();
     vec![
-        whole("curve", &|c| c.id().0 as i32, -1),
-        whole("open", &|c| i32::from(c.is_open()), 0),
-        whole("sides", &|c| c.sides().len() as i32, 0),
-        whole("chart_a", &|c| beside(c, 0), -1),
-        whole("chart_b", &|c| beside(c, 1), -1),
-        array("length", lengths),
+        array("curve", column(-1, corners, curves, |c| c.id().0 as i32)),
+        array("open", column(0, corners, curves, |c| i32::from(c.is_open()))),
+        array("sides", column(0, corners, curves, |c| c.sides().len() as i32)),
+        array("chart_a", column(-1, corners, curves, |c| chart_beside(c, 0))),
+        array("chart_b", column(-1, corners, curves, |c| chart_beside(c, 1))),
+        array("length", column(0.0, corners, curves, Curve::length)),
     ]
+}
+
+/// A field: the same value at every corner, then one value per curve.
+fn column<T: Clone>(at_corner: T, corners: usize, curves: &[Curve], of_curve: impl Fn(&Curve) -> T) -> Vec<T> {
+    let mut values = vec![at_corner; corners];
+    values.extend(curves.iter().map(of_curve));
+    values
+}
+
+/// The chart on a side of a curve; -1 where it has no such side.
+fn chart_beside(curve: &Curve, side: usize) -> i32 {
+    curve.sides().get(side).map_or(-1, |side| side.chart.0 as i32)
 }

@@ -63,6 +63,14 @@ pub struct Shape {
 }
 
 /// The shift of chart `index` of `count` in param.vtu: unit disks in a square grid.
+///
+/// ```
+/// use planish::formats::vtu::shift;
+///
+/// // Five charts lie in rows of three, from the top left to the bottom right.
+/// let shifts: Vec<[f64; 2]> = (0..5).map(|chart| shift(chart, 5)).collect();
+/// assert_eq!(shifts, [[0.0, 0.0], [2.25, 0.0], [4.5, 0.0], [0.0, -2.25], [2.25, -2.25]]);
+/// ```
 pub fn shift(index: usize, count: usize) -> [f64; 2] {
     let columns = (count as f64).sqrt().ceil().max(1.0) as usize;
     [2.25 * (index % columns) as f64, -2.25 * (index / columns) as f64]

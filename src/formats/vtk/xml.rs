@@ -27,14 +27,21 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
 /// names hold such, which do not matter here, and the library knows UTF-8 only. Appended data stay as they are.
 fn readable(bytes: &[u8]) -> Cow<'_, [u8]> {
     const APPENDED: &[u8] = b"<AppendedData";
-    let prolog = bytes[..bytes.len().min(200)].split(|b| *b == b'>').next().unwrap_or_default().to_ascii_lowercase();
-    let says = |encoding: &[u8]| prolog.windows(encoding.len()).any(|w| w == encoding);
-    if !says(b"iso-8859-") && !says(b"windows-125") && !says(b"latin1") {
+    /// How the names of encodings of one byte per letter begin.
+    const ONE_BYTE: [&[u8]; 3] = [b"iso-8859-", b"windows-125", b"latin1"];
+    let head = &bytes[..bytes.len().min(200)];
+    // Up to the end of the first tag, which is the prolog if there is one.
+    let prolog = head.split(|byte| *byte == b'>').next().unwrap_or_default().to_ascii_lowercase();
+    if !ONE_BYTE.iter().any(|encoding| prolog.windows(encoding.len()).any(|word| word == *encoding)) {
         return Cow::Borrowed(bytes);
     }
-    let end = bytes.windows(APPENDED.len()).position(|w| w == APPENDED).unwrap_or(bytes.len());
+    let end = bytes.windows(APPENDED.len()).position(|word| word == APPENDED).unwrap_or(bytes.len());
     let mut readable = bytes.to_vec();
-    readable[..end].iter_mut().filter(|b| !b.is_ascii()).for_each(|b| *b = b'?');
+    for byte in &mut readable[..end] {
+        if !byte.is_ascii() {
+            *byte = b'?';
+        }
+    }
     Cow::Owned(readable)
 }
 
@@ -106,6 +113,7 @@ impl<'a> Arrays<'a> {
         surface: &mut Surface,
     ) -> Result<(), VtkError> {
         let ends = self.ids(piece, Role::Offsets(section), count)?;
+        // The end of the last cell tells how many corners there are.
         let needed = ends.last().copied().unwrap_or_default();
         let corners = self.ids(piece, Role::Connectivity(section), u64::from(needed))?;
         let own_types: Vec<u8>;
@@ -133,9 +141,8 @@ impl<'a> Arrays<'a> {
             return Text { bytes, at }.points(&name, count);
         }
         let bytes = self.bytes_of(array, &name)?;
-        let declared = count.saturating_mul(3);
-        let needed = self.at_least(array, &name, declared, bytes.len() as u64 / array.scalar.bytes())?;
-        Ok(array.scalar.points(&bytes[..(needed * array.scalar.bytes()) as usize], self.packing.order))
+        let bytes = self.first(array, &name, count.saturating_mul(3), &bytes)?;
+        Ok(array.scalar.points(bytes, self.packing.order))
     }
 
     /// The first `count` numbers of an array.
@@ -149,19 +156,21 @@ impl<'a> Arrays<'a> {
             return Text { bytes, at }.ids(&name, count);
         }
         let bytes = self.bytes_of(&array, &name)?;
-        let needed = self.at_least(&array, &name, count, bytes.len() as u64 / array.scalar.bytes())?;
-        let ids = array.scalar.ids(&bytes[..(needed * array.scalar.bytes()) as usize], self.packing.order);
-        ids.map_err(|bad| {
+        let bytes = self.first(&array, &name, count, &bytes)?;
+        array.scalar.ids(bytes, self.packing.order).map_err(|bad| {
             let problem = format!("number {} of {name} is {}, which is no id", bad.entry, bad.value);
             VtkError::Syntax { location: self.location(&array), problem }
         })
     }
 
-    fn at_least(&self, array: &Array, name: &str, declared: u64, there: u64) -> Result<u64, VtkError> {
-        if declared <= there {
-            return Ok(declared);
+    /// The bytes of the first numbers of an array, as many as are `declared`.
+    fn first<'b>(&self, array: &Array, name: &str, declared: u64, bytes: &'b [u8]) -> Result<&'b [u8], VtkError> {
+        let there = bytes.len() as u64 / array.scalar.bytes();
+        if declared > there {
+            return Err(VtkError::Count { location: self.location(array), what: name.to_owned(), declared, there });
         }
-        Err(VtkError::Count { location: self.location(array), what: name.to_owned(), declared, there })
+        // No more than there are: nothing overflows.
+        Ok(&bytes[..(declared * array.scalar.bytes()) as usize])
     }
 
     /// Where the numbers of an array begin.
@@ -172,17 +181,23 @@ impl<'a> Arrays<'a> {
         }
     }
 
+    /// The appended data from a byte on; where they end, their own header tells.
+    fn appended(&self, array: &Array, name: &str, offset: u64, appended: Appended<'a>) -> Result<Stream<'a>, VtkError> {
+        let data = usize::try_from(offset).ok().and_then(|offset| appended.bytes.get(offset..));
+        match data {
+            Some(data) if appended.base64 => Ok(Stream::base64(data)),
+            Some(data) => Ok(Stream::Raw(data)),
+            None => {
+                let problem = format!("{name} begin at byte {offset} of {} appended bytes", appended.bytes.len());
+                Err(VtkError::Syntax { location: Location::line_of(self.bytes, array.at), problem })
+            }
+        }
+    }
+
     /// The bytes of an array that is no text.
     pub fn bytes_of(&mut self, array: &Array<'a>, name: &str) -> Result<Cow<'a, [u8]>, VtkError> {
         let stream = match (array.data, self.appended) {
-            (Data::Appended(offset), Some(appended)) => {
-                let data = usize::try_from(offset).ok().and_then(|offset| appended.bytes.get(offset..));
-                let Some(data) = data else {
-                    let problem = format!("{name} begin at byte {offset} of {} appended bytes", appended.bytes.len());
-                    return Err(VtkError::Syntax { location: Location::line_of(self.bytes, array.at), problem });
-                };
-                if appended.base64 { Stream::base64(data) } else { Stream::Raw(data) }
-            }
+            (Data::Appended(offset), Some(appended)) => self.appended(array, name, offset, appended)?,
             (Data::Appended(_), None) => {
                 let problem = format!("{name} are appended, but there is no <AppendedData>: the file was cut off");
                 return Err(VtkError::Syntax { location: Location::line_of(self.bytes, array.at), problem });

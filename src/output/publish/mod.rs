@@ -269,8 +269,12 @@ impl<D: Disk> Publisher<D> {
         // Nobody who closes is kept waiting by a lock.
         let is_wanted = || *self.open.lock() && wanted();
         let Some(_alone) = staging::pass_gate(&self.disk, &self.out, is_wanted)? else {
-            return if is_wanted() { Err(PublishError::Busy(self.out.join(STAGING).join(GATE))) } else { Ok(false) };
+            if is_wanted() {
+                return Err(PublishError::Busy(self.out.join(STAGING).join(GATE)));
+            }
+            return Ok(false);
         };
+        // Held to the end: who closes waits for what is being put in place.
         let open = self.open.lock();
         if !*open || !wanted() {
             return Ok(false);
@@ -290,6 +294,8 @@ impl<D: Disk> Publisher<D> {
             Err(error) if error.kind() == ErrorKind::NotFound => {}
             Err(error) => return Err(at(&target)(error)),
         }
+        // From here on a loss of power finds the promise, and settles it at the next start. So it is settled here, too,
+        // whether the result got its place or not.
         let promise = desk.complete(&half, name).map_err(at(&target))?;
         let put = desk.put_in_place(&folder, last);
         let settled = desk.settle(&self.disk, &self.out, &promise, Some(&own));
@@ -313,10 +319,8 @@ impl<D: Disk> Publisher<D> {
         if !is_plain(name) {
             return Err(PublishError::Foreign(target));
         }
-        // From the output folder down.
-        let above: Vec<&Path> = name.ancestors().skip(1).filter(|part| !part.as_os_str().is_empty()).collect();
         let mut folder = self.disk.open(&self.out).map_err(at(&self.out))?;
-        for part in above.into_iter().rev() {
+        for part in folders_above(name) {
             let path = self.out.join(part);
             folder = match self.disk.open(&path) {
                 Err(error) if error.kind() == ErrorKind::NotFound => return Ok(BTreeSet::new()),
@@ -360,6 +364,14 @@ fn is_plain(name: &Path) -> bool {
     name.components().all(|part| matches!(part, Component::Normal(_))) && name.file_name().is_some()
 }
 
+/// The folders on the way from the output folder down to a result: of `a/b/x.stl`, `a` and `a/b`.
+fn folders_above(name: &Path) -> Vec<&Path> {
+    // From the name up: itself, the folders, and the empty path.
+    let mut above: Vec<&Path> = name.ancestors().skip(1).filter(|part| !part.as_os_str().is_empty()).collect();
+    above.reverse();
+    above
+}
+
 /// The names of what planish has written there: none of them where nothing is there, or an empty folder. None where it is
 /// neither that nor an older result (a folder with a report of planish).
 fn replaceable<F: Folder>(folder: &F, name: &OsStr) -> io::Result<Option<BTreeSet<OsString>>> {
@@ -379,6 +391,7 @@ fn replaceable<F: Folder>(folder: &F, name: &OsStr) -> io::Result<Option<BTreeSe
 
 /// Why a result was not put in place.
 fn not_put<F: Folder>(error: io::Error, folder: &F, target: &Path) -> PublishError {
+    // The root of another file system has another device than the folder it is in.
     let device = |stat: io::Result<disk::Stat>| stat.ok().map(|stat| stat.identity.device());
     let is_mount_point = || device(folder.stat()) != device(folder.stat_of(target.file_name().unwrap_or_default()));
     match Errno::from_io_error(&error) {

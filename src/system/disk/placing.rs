@@ -20,6 +20,18 @@ pub fn unique_name(prefix: &str) -> OsString {
 
 /// Makes something under a new name, which begins like this.
 ///
+/// ```
+/// use planish::system::disk::make_unique;
+///
+/// # fn main() -> std::io::Result<()> {
+/// let folder = tempfile::tempdir()?;
+/// let (name, ()) = make_unique("run-", |name| std::fs::create_dir(folder.path().join(name)))?;
+/// assert!(name.to_string_lossy().starts_with("run-"));
+/// assert!(folder.path().join(&name).is_dir());
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// Those of `make`.
 pub fn make_unique<T>(prefix: &str, make: impl Fn(&OsStr) -> io::Result<T>) -> io::Result<(OsString, T)> {

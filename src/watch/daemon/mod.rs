@@ -36,7 +36,8 @@ const DOUBT: Duration = Duration::from_secs(30);
 /// An input that is not done after this is worth a warning.
 const LONG: Duration = Duration::from_secs(600);
 
-/// So many results at most are looked for whenever the inbox is looked at.
+/// So many results at most are looked for whenever the inbox is looked at: each takes a call of the system, on a disk that
+/// may be far away. More find a removed result sooner.
 const LOOKED_FOR: usize = 500;
 
 /// The status is told at least this often, so that one knows that the daemon lives.
@@ -150,15 +151,19 @@ impl<'a> Daemon<'a> {
                 Event::Reload => self.reload(),
                 Event::Tick => {}
             }
-            let over = match self.phase {
-                Phase::Watching => false,
-                Phase::Draining => self.jobs.is_empty(),
-                Phase::Stopping(latest) => self.jobs.is_empty() || Instant::now() >= latest,
-            };
-            if over {
+            if self.is_over() {
                 self.last_words();
                 return Ok(self.status.ended);
             }
+        }
+    }
+
+    /// Whether there is nothing to wait for any more.
+    fn is_over(&self) -> bool {
+        match self.phase {
+            Phase::Watching => false,
+            Phase::Draining => self.jobs.is_empty(),
+            Phase::Stopping(latest) => self.jobs.is_empty() || Instant::now() >= latest,
         }
     }
 
@@ -224,8 +229,10 @@ impl<'a> Daemon<'a> {
 
     /// The next look comes when a file may have settled, but not before the last one has rested.
     fn look_when_due(&mut self) {
-        let due = self.inbox.due().map(|due| due.max(self.watcher.next_scan()));
-        self.next_look = due.map_or(self.next_look, |due| due.min(self.next_look));
+        if let Some(due) = self.inbox.due() {
+            let due = due.max(self.watcher.next_scan());
+            self.next_look = self.next_look.min(due);
+        }
     }
 
     /// Sees whether results are still there: who removes one has its input done again.
@@ -284,7 +291,9 @@ impl<'a> Daemon<'a> {
             self.status.ended.count(done.report.status);
             self.status.last_published = Some(status::now());
         }
-        self.metrics.iter_mut().for_each(Metrics::soon);
+        if let Some(metrics) = &mut self.metrics {
+            metrics.soon();
+        }
         // A withdrawn job says nothing about the file that has its name now.
         if self.jobs.get(&job.name).is_some_and(|current| Arc::ptr_eq(current, &job)) {
             self.jobs.remove(&job.name);

@@ -31,8 +31,9 @@ impl Daemon<'_> {
     /// When somebody is to hear something next.
     pub(super) fn next_words(&self) -> Instant {
         let tell = if self.is_busy() { self.next_tell } else { self.next_tell + ALIVE };
-        let others = [self.supervisor.next_beat(), self.metrics.as_ref().map(|metrics| metrics.next())];
-        others.into_iter().flatten().fold(tell, Instant::min)
+        let beat = self.supervisor.next_beat().unwrap_or(tell);
+        let metrics = self.metrics.as_ref().map_or(tell, |metrics| metrics.next());
+        tell.min(beat).min(metrics)
     }
 
     /// What is told at the very end.
@@ -93,15 +94,20 @@ impl Daemon<'_> {
         status.waiting = waiting.len();
         status.next = waiting.iter().take(NAMED).map(|job| job.name.to_string_lossy().into_owned()).collect();
         status.running = self.conveyor.running().into_iter().map(Progress::from).collect();
-        let troubles = status.running.iter().filter_map(|job| job.trouble.as_ref());
-        if let Some(trouble) = troubles.min().filter(|t| status.last_error.as_ref().is_none_or(|e| e.message != **t)) {
-            status.last_error = Some(Trouble::now(trouble));
+        // One of them stands for all; the first by its text, so that it is the same one the next time.
+        let trouble = status.running.iter().filter_map(|job| job.trouble.as_ref()).min();
+        if let Some(trouble) = trouble {
+            let is_known = status.last_error.as_ref().is_some_and(|error| error.message == *trouble);
+            if !is_known {
+                status.last_error = Some(Trouble::now(trouble));
+            }
         }
         status.notable = self.inbox.notable().take(NAMED).map(Noted::from).collect();
         // Each is counted even where there is none.
         status.notable_states = STATES.map(|state| (state.to_owned(), 0)).into();
-        let count = |Notable { state, .. }| *status.notable_states.entry(state.to_owned()).or_default() += 1;
-        self.inbox.notable().for_each(count);
+        for notable in self.inbox.notable() {
+            *status.notable_states.entry(notable.state.to_owned()).or_default() += 1;
+        }
         status.notables = status.notable_states.values().sum();
         status.unsettled = status.notable_states[UNSETTLED];
         status.oldest = self.inbox.oldest().map(|since| status::tenths(since.elapsed()));
