@@ -6,7 +6,9 @@
 //! * [`bernstein`]: whether a quadratic triangle in the plane is valid, exactly.
 //!
 //! Another element is one more file beside [`element::P2`], and a triangle that is curved in space another
-//! [`geometry::FirstForm`]; only what decides validity, and so the untangler, is made for quadratic triangles.
+//! [`geometry::FirstForm`]: systems, quadrature and energies take them as they are. What decides validity, and all that
+//! is built on it (constraints of the untangler, cells of the certifier), is made for quadratic triangles; see
+//! docs/architecture.md.
 
 pub mod assembly;
 pub mod bernstein;
