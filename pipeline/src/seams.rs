@@ -24,6 +24,27 @@ use crate::topology::{ChartId, CurveId, HalfEdgeId, VertexId};
 use crate::vec3::distance;
 
 /// All curves of an atlas.
+///
+/// ```
+/// use planish_core::decompose::assemble;
+/// use planish_core::seams::SeamNetwork;
+/// use planish_core::topology::ChartId;
+/// use planish_core::{repair, shapes};
+///
+/// // A disk of radius 1, cut along its diameter.
+/// let mesh = repair(&shapes::flat_disk(4), &repair::Settings::default())?.mesh;
+/// let is_upper = |face: usize| mesh.corners(face).iter().map(|p| p[1]).sum::<f64>() > 0.0;
+/// let labels: Vec<u32> = (0..mesh.triangles().len()).map(|f| u32::from(is_upper(f))).collect();
+/// let atlas = assemble(&mesh, &labels)?;
+/// let network = SeamNetwork::new(&mesh, atlas.charts(), 0.0);
+/// assert_eq!((network.curves().len(), network.points().len()), (3, 2), "the seam, and half a circle on either side");
+/// let seam = network.seams().next().expect("there is one");
+/// assert!((seam.length() - 2.0).abs() < 1e-12 && seam.segments() == 8 && seam.sides().len() == 2);
+/// assert_eq!(network.neighbours(ChartId(0)), [ChartId(1)]);
+/// // The loop of a chart passes two curves: the seam, and its open boundary.
+/// assert_eq!(network.loops(ChartId(0))[0].len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct SeamNetwork {
     curves: Vec<Curve>,

@@ -10,6 +10,20 @@ use crate::topology::{ChartId, FaceId, HalfEdgeId, VertexId};
 ///
 /// # Errors
 /// [`Illegal`], for the first chart that is no disk with or without holes.
+///
+/// ```
+/// use planish_core::decompose::{Illegal, assemble};
+/// use planish_core::{repair, shapes};
+///
+/// let mesh = repair(&shapes::sphere(8), &repair::Settings::default())?.mesh;
+/// let is_north = |face: usize| mesh.corners(face).iter().map(|p| p[2]).sum::<f64>() > 0.0;
+/// let labels: Vec<u32> = (0..mesh.triangles().len()).map(|f| u32::from(is_north(f))).collect();
+/// assert_eq!(assemble(&mesh, &labels)?.charts().len(), 2);
+/// // The whole sphere has no boundary: it is no chart.
+/// let whole = assemble(&mesh, &vec![0; labels.len()]);
+/// assert!(matches!(whole, Err(Illegal::Topology { loops: 0, euler: 2, .. })));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn assemble(mesh: &SurfaceMesh, labels: &[u32]) -> Result<Atlas, Illegal> {
     let sets = by_label(labels);
     let mut places = Places::new(mesh, &sets);

@@ -27,6 +27,20 @@ const OFF_CENTRE: f64 = 3.0;
 ///
 /// # Errors
 /// [`Error::Illegal`]: a fault of planish; [`Error::Interrupted`].
+///
+/// ```
+/// use planish_core::decompose::{Settings, decompose, split};
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{repair, shapes};
+///
+/// let mesh = repair(&shapes::disk(6), &repair::Settings::default())?.mesh;
+/// let atlas = decompose(&mesh, &Settings::default(), &NoMonitor)?;
+/// let chart = &atlas.charts()[0];
+/// let parts = split(chart, None, &Settings::default(), &NoMonitor)?.expect("it has more than one triangle");
+/// assert!(parts.len() >= 2 && parts.iter().all(|part| part.id() == chart.id()));
+/// assert_eq!(parts.iter().map(|part| part.triangles().len()).sum::<usize>(), chart.triangles().len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn split(
     chart: &Chart,
     log_scale: Option<&[f64]>,

@@ -20,6 +20,19 @@ const BY_CELLS: usize = 31;
 const DEPTH: usize = BY_CELLS + 33;
 
 /// Items by their boxes.
+///
+/// ```
+/// use planish_core::evaluate::Bvh;
+/// use planish_core::vec3::BoundingBox;
+///
+/// let boxes = [0.0, 1.0, 5.0].map(|x| BoundingBox { min: [x, 0.0, 0.0], max: [x + 2.0, 1.0, 1.0] });
+/// let tree = Bvh::new(boxes);
+/// let (mut pairs, mut right) = (vec![], vec![]);
+/// tree.pairs(|i, j| pairs.push((i, j)));
+/// assert_eq!(pairs, [(0, 1)]);
+/// tree.overlapping(&BoundingBox { min: [6.0, 0.0, 0.0], max: [9.0, 1.0, 1.0] }, |i| right.push(i));
+/// assert_eq!(right, [2]);
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Bvh {
     nodes: Vec<Node>,

@@ -70,6 +70,19 @@ impl Sample {
 }
 
 /// What repair found and did.
+///
+/// ```
+/// use planish_core::{mesh::TriangleSoup, repair};
+///
+/// let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+/// // The second triangle is turned over, the third a copy of the first, and the last one has two equal corners.
+/// let soup = TriangleSoup::new(points, vec![[0, 1, 2], [0, 3, 2], [1, 2, 0], [3, 3, 0]])?;
+/// let report = repair(&soup, &repair::Settings::default())?.report;
+/// assert_eq!(report.flipped_triangles.first, [1]);
+/// assert_eq!(report.duplicate_triangles.first, [2]);
+/// assert_eq!(report.degenerate_triangles.first, [3]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// Points merged into a bit-equal one.
@@ -157,6 +170,21 @@ struct Measure {
 ///
 /// # Errors
 /// [`Error::OnlyDegenerate`] when nothing is left.
+///
+/// ```
+/// use planish_core::repair::{Settings, repair};
+/// use planish_core::shapes;
+///
+/// // A plate cut along its middle, as exporters leave it: the two sides of the cut differ in their last digits.
+/// let soup = shapes::cracked_patch();
+/// let repaired = repair(&soup, &Settings::default())?;
+/// assert_eq!((repaired.raw.components, repaired.mesh.topology_summary().components), (2, 1));
+/// assert_eq!(repaired.report.cracks_closed, 8);
+/// // Without a tolerance nothing is joined.
+/// let apart = repair(&soup, &Settings { weld: 0.0 })?;
+/// assert_eq!(apart.mesh.topology_summary().components, 2);
+/// # Ok::<(), planish_core::repair::Error>(())
+/// ```
 pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Error> {
     let (mut builder, welded) = weld::weld(soup);
     let mut report = Report { welded, ..Report::default() };

@@ -12,6 +12,15 @@ const AT_TIP: f64 = 1e-9;
 
 /// The ratio of twice the inscribed circle's radius to that of the circumscribed one: 1 for equilateral triangles, 0 for
 /// those without an area (gamma of Gmsh).
+///
+/// ```
+/// use planish_core::soundness::gamma;
+///
+/// let isosceles = |height| [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, height, 0.0]];
+/// assert!((gamma(isosceles(0.75_f64.sqrt())) - 1.0).abs() < 1e-12);
+/// assert!(gamma(isosceles(0.01)) < 0.001, "it falls with the square of the height");
+/// assert_eq!(gamma(isosceles(0.0)), 0.0);
+/// ```
 pub fn gamma(p: [Vec3; 3]) -> f64 {
     let [a, b, c] = [0, 1, 2].map(|k| distance(p[k], p[(k + 1) % 3]));
     let doubled = norm(cross(sub(p[1], p[0]), sub(p[2], p[0])));
