@@ -175,6 +175,7 @@ impl SeamNetwork {
             let mut taken: Vec<u32> = neighbours.iter().filter_map(|c| colours.get(c.index()).copied()).collect();
             taken.sort_unstable();
             taken.dedup();
+            // Sorted and without repetitions: the first number that is not at its own position is missing from it.
             colours.push(taken.iter().zip(0..).find(|(t, i)| **t != *i).map_or(taken.len() as u32, |(_, i)| i));
         }
         colours
@@ -262,6 +263,7 @@ impl Boundary {
         ends.sort_unstable();
         let mut corner = vec![false; self.welded];
         for at in ends.chunk_by(|a, b| a.0 == b.0) {
+            // Two segments meet, with the same charts beside both, and no chart is there twice.
             let runs_on = at.len() == 2 && self.charts(at[0].1).eq(self.charts(at[1].1)) && self.charts_once(at[0].1);
             corner[at[0].0 as usize] = !runs_on;
         }
@@ -358,6 +360,7 @@ impl<'a> Tracer<'a> {
     fn begin(&mut self, run: &[usize]) -> CurveId {
         let id = CurveId::at(self.network.curves.len());
         let ends = |s: &usize| self.boundary.steps[*s].ends;
+        // Of every half-edge the begin, and of the last one the end, too.
         let last = run.iter().rev().take(1).map(|s| ends(s)[1]);
         let vertices: Vec<VertexId> = run.iter().map(|s| ends(s)[0]).chain(last).collect();
         for (position, s) in run.iter().enumerate() {

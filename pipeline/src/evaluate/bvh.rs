@@ -75,6 +75,7 @@ impl Bvh {
         let at = self.nodes.len();
         let items = &self.items[first..end];
         let around = items[0].around;
+        // Before its parts, so that the first of these is the next node. The box is not known yet.
         self.nodes.push(Node { around, first: first as u32, end: end as u32, second: 0 });
         let (around, second) = if items.len() > LEAF {
             let middle = first + parting(&cells[first..end], depth);
@@ -225,6 +226,7 @@ fn parting(cells: &[(u64, u32)], depth: usize) -> usize {
     if first == last || depth >= BY_CELLS {
         return cells.len() / 2;
     }
+    // The highest bit in which the first and the last cell differ parts the smallest cell around both.
     let highest = 1_u64 << (first ^ last).ilog2();
     cells.partition_point(|(cell, _)| cell & highest == 0)
 }

@@ -81,6 +81,7 @@ impl Plane {
 
 /// Two directions at right angles to a unit normal and each other, which turn left around it.
 fn axes(normal: Vec3) -> [Vec3; 2] {
+    // The axis that is closest to the plane: the vector product with it cannot vanish.
     let least = (1..3).fold(0, |best, k| if normal[k].abs() < normal[best].abs() { k } else { best });
     let mut direction = [0.0; 3];
     direction[least] = 1.0;

@@ -114,12 +114,16 @@ impl Metric {
         let mut shapes: Vec<_> = scaled.iter().map(|t| TriangleShape::of(*t)).collect();
         let total: f64 = shapes.iter().flat_map(|s| s.lengths).sum();
         let margin = SLACK * total / (3 * shapes.len().max(1)) as f64;
+        // The smallest number that gives the worst triangle its margin: it grows the sum of two sides twice, the third one once.
         let added = shapes.iter().map(|s| margin - s.slack()).fold(0.0, f64::max);
         if added > 0.0 {
             shapes.iter_mut().for_each(|s| s.lengths = s.lengths.map(|l| l + added));
         }
-        let differs = |(s, t): (&TriangleShape, &[Vec3; 3])| (s.area() - triangle_area(*t)).abs() > FLAG * s.area();
-        let flagged = shapes.iter().zip(&scaled).map(differs).collect();
+        let mut flagged = Vec::with_capacity(shapes.len());
+        for (shape, corners) in shapes.iter().zip(&scaled) {
+            let change = (shape.area() - triangle_area(*corners)).abs();
+            flagged.push(change > FLAG * shape.area());
+        }
         Self { shapes, mollified_by: added, flagged, scale }
     }
 

@@ -50,6 +50,7 @@ fn value_apart(points: &[Vec3], axis: usize) -> Option<ValueApart> {
     let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
     values.sort_unstable_by(f64::total_cmp);
     let (least, largest) = (*values.first()?, *values.last()?);
+    // Sorted, all that have the least value come first, and all that have the largest one come last.
     let below = values.partition_point(|v| *v <= least);
     let above = values.partition_point(|v| *v < largest);
     let apart = |value: f64, vertices: usize, others: &[f64]| {

@@ -85,6 +85,7 @@ fn step(points: &[Vec3], axis: usize) -> f64 {
     }
     let median = *sizes.select_nth_unstable_by(middle, f32::total_cmp).1;
     let step = f64::from(median.next_up()) - f64::from(median);
+    // Odd multiples of the step, or finer numbers: even multiples of it would fit wider steps, too.
     let is_rounded = step.is_finite() && points.iter().any(|p| p[axis] % (2.0 * step) != 0.0);
     if is_rounded { step } else { 0.0 }
 }

@@ -208,6 +208,7 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     edges = renewed(edges, changed, &builder.triangles);
     report.t_junctions_left = builder.t_junctions_left(&edges, &measure);
     drop(measure);
+    // A surface that was counted without inconsistent edges, and has not changed, is oriented as it is.
     let as_counted = report.duplicate_triangles.count == 0 && report.cracks_closed == 0 && !split;
     if !as_counted || raw.inconsistent_edges > 0 {
         report.flipped_triangles = builder.orient(&edges);
@@ -218,6 +219,7 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     let opened = report.slits_opened > 0;
     edges = renewed(edges, opened, &builder.triangles);
     report.triangles_added = if split || opened { builder.count_added() } else { 0 };
+    // Where the triangles are those that were counted, their counts still hold.
     let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0 && !opened);
     let mesh = builder.into_mesh(edges, input_points, known, &mut report);
     // As read: vertices of degenerate triangles count, though these do not.
@@ -307,18 +309,9 @@ impl MeshBuilder {
             return 0;
         }
         let fans = VertexFans::new(&self.triangles, edges);
-        let ends = |h: &HalfEdgeId| {
-            let [a, b] = [h.index(), h.next().index()].map(|corner| fans.of_corner[corner]);
-            [a.min(b), a.max(b)]
-        };
-        let rejoined = |sides: &[HalfEdgeId]| {
-            let mut all: Vec<[u32; 2]> = sides.iter().map(ends).collect();
-            all.sort_unstable();
-            all.windows(2).any(|w| w[0] == w[1])
-        };
         let mut cut: Vec<(HalfEdgeId, VertexId)> = Vec::new();
         let mut opened = 0;
-        for (_, sides) in edges.iter().filter(|(_, sides)| meets(sides) && rejoined(sides)) {
+        for (_, sides) in edges.iter().filter(|(_, sides)| meets(sides) && are_rejoined(sides, &fans)) {
             let t = self.triangles[sides[0].face().index()];
             let [a, b] = [t[sides[0].side()], t[(sides[0].side() + 1) % 3]];
             let middle = VertexId::at(self.points.len());
@@ -375,11 +368,12 @@ impl MeshBuilder {
         for (c, flip) in found.component.iter().zip(&found.flip) {
             balance[*c as usize] += if *flip { -1 } else { 1 };
         }
-        let turn = |(flip, c): (&bool, &u32)| found.orientable[*c as usize] && *flip != (balance[*c as usize] < 0);
-        let turned = found.flip.iter().zip(&found.component).map(turn);
         let mut flipped = Sample::default();
-        for (face, turn) in turned.enumerate() {
-            if turn {
+        for (face, component) in found.component.iter().enumerate() {
+            let component = *component as usize;
+            // `flip` is relative to the first triangle: where most would have to be flipped, the others are.
+            let is_minority = found.flip[face] != (balance[component] < 0);
+            if found.orientable[component] && is_minority {
                 self.triangles[face].swap(1, 2);
                 flipped.push(self.source[face]);
             }
@@ -418,6 +412,18 @@ impl MeshBuilder {
     }
 }
 
+/// Whether two of these half-edges run between the same two fans: they are one edge again when every fan has a vertex of
+/// its own.
+fn are_rejoined(sides: &[HalfEdgeId], fans: &VertexFans) -> bool {
+    let mut ends = Vec::with_capacity(sides.len());
+    for h in sides {
+        let [a, b] = [h.index(), h.next().index()].map(|corner| fans.of_corner[corner]);
+        ends.push([a.min(b), a.max(b)]);
+    }
+    ends.sort_unstable();
+    ends.windows(2).any(|pair| pair[0] == pair[1])
+}
+
 /// One vertex per fan, in ascending order of the vertices they come from: per fan its vertex, and per
 /// vertex the welded point it is a copy of.
 fn split_vertices(fan_vertices: &[VertexId], report: &mut Report) -> (Vec<VertexId>, Vec<u32>) {
@@ -441,9 +447,14 @@ fn pinned_vertices(welded: &[u32], triangles: &[[VertexId; 3]], edges: &EdgeTabl
         on_boundary[triangles[h.face().index()][h.side()].index()] = true;
         on_boundary[triangles[h.face().index()][h.next().side()].index()] = true;
     }
-    let copies = welded.iter().zip(&on_boundary).collect::<Vec<_>>();
-    let pinned = |sheets: &&[(&u32, &bool)]| sheets.len() > 1 && sheets.iter().any(|s| !s.1);
-    copies.chunk_by(|a, b| a.0 == b.0).filter(pinned).count()
+    let vertices: Vec<(u32, bool)> = welded.iter().copied().zip(on_boundary).collect();
+    let mut pinned = 0;
+    // Copies of a vertex follow each other.
+    for copies in vertices.chunk_by(|a, b| a.0 == b.0) {
+        let touches_inside = copies.iter().any(|(_, on_boundary)| !on_boundary);
+        pinned += usize::from(copies.len() > 1 && touches_inside);
+    }
+    pinned
 }
 
 /// The half-edges along open edges, ascending.

@@ -24,7 +24,7 @@ const AT_TIP: f64 = 1e-9;
 pub fn gamma(p: [Vec3; 3]) -> f64 {
     let [a, b, c] = [0, 1, 2].map(|k| distance(p[k], p[(k + 1) % 3]));
     let doubled = norm(cross(sub(p[1], p[0]), sub(p[2], p[0])));
-    // 2 r / R = 4 A^2 ... / (s a b c), with A = doubled / 2 and s half the perimeter.
+    // r = A / s and R = a b c / (4 A), with s half the perimeter: 2 r / R = 8 A^2 / (s a b c), and A is half of `doubled`.
     let product = 0.5 * (a + b + c) * a * b * c;
     if product > 0.0 { 2.0 * doubled * doubled / product } else { 0.0 }
 }
@@ -49,8 +49,8 @@ pub fn shapes(mesh: &Triangulation, surface: &Triangulation, min_gamma: f64) -> 
     let tips = if bad.is_empty() { vec![] } else { tips(surface) };
     let reach = AT_TIP * surface.diagonal();
     let at_tip = |v: &VertexId| tips.iter().any(|tip| distance(*tip, mesh.points[v.index()]) <= reach);
-    let (excused, mut below): (Vec<_>, Vec<_>) =
-        bad.into_iter().partition(|(t, _)| mesh.triangles[*t as usize].iter().any(at_tip));
+    let touches_tip = |(t, _): &(u32, f64)| mesh.triangles[*t as usize].iter().any(at_tip);
+    let (excused, mut below): (Vec<_>, Vec<_>) = bad.into_iter().partition(touches_tip);
     below.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
     Shapes {
         min: all.iter().copied().fold(f64::INFINITY, f64::min),

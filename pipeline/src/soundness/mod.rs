@@ -412,6 +412,7 @@ fn by_charts(
 ) -> SurfaceDistance {
     let count = atlas.charts.len();
     let mut per_chart: Vec<Vec<u32>> = vec![Vec::new(); count];
+    // Triangles with labels that no chart has.
     let mut strays: Vec<u32> = Vec::new();
     for (t, label) in labels.iter().enumerate() {
         per_chart.get_mut(*label as usize).unwrap_or(&mut strays).push(t as u32);

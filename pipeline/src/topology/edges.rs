@@ -38,6 +38,8 @@ impl EdgeTable {
         let ends = triangles.iter().flat_map(|t| [0, 1, 2].map(|side| ordered(t, side)));
         let by_lower_end = || ends.clone().zip(0_u32..).map(|((low, high), h)| (low, (high, h)));
         let vertices = triangles.iter().flatten().map(|v| v.index() + 1).max().unwrap_or(0);
+        // A counting sort by the lower end, then a sort of the few edges around each vertex: half-edges are never
+        // sorted all at once.
         let mut at_lower_end = Csr::sorted(vertices, by_lower_end);
         let mut groups: Csr<HalfEdgeId> = Csr::with_capacity(3 * triangles.len());
         let mut group_of = vec![0_u32; 3 * triangles.len()];

@@ -159,6 +159,7 @@ impl TopologySummary {
         let boundary_loops = count_loops(edges, &fans);
         let cells = triangles.len() as i64 - edges.len() as i64;
         // Sheets that only touch in a vertex are apart: the genus counts a vertex once per fan.
+        // Euler number = 2 components - 2 genus - loops: this is twice the genus.
         let handles = 2 * components as i64 - boundary_loops as i64 - (fans.count as i64 + cells);
         let closed_up = orientable && nonmanifold_edges == 0;
         Self {
