@@ -62,8 +62,8 @@ pub fn split(
     pieces(chart, cut, settings, monitor).map(Some)
 }
 
-/// Cuts `chart` between two of its vertices, given by their places in the chart, into at least two
-/// charts with the same id. No triangle may have both as corners.
+/// Cuts `chart` between two of its vertices, numbered within the chart, into at least two charts with the same id. No
+/// triangle may have both as corners.
 ///
 /// A chart whose boundary passes twice through one place in space (copies of a vertex at which sheets touch) cannot be
 /// handed to meshers, which find places in the plane by those in space.

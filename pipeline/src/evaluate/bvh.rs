@@ -114,7 +114,7 @@ impl Bvh {
     }
 
     /// The item with the least squared distance to `x`, if one is nearer than the root of `bound`; `distance` tells that of
-    /// an item. Of equal ones, the first that is met.
+    /// an item, which must be no less than that to its box. Of equal ones, the first that is met.
     pub fn nearest(&self, x: Vec3, bound: f64, mut distance: impl FnMut(u32) -> f64) -> Option<(u32, f64)> {
         let mut best: Option<(u32, f64)> = None;
         let mut least = bound;

@@ -60,22 +60,22 @@ pub struct Located {
 }
 
 impl LinearMap {
-    /// A map of `triangles` over nodes with places in space and in the plane, as many of each.
+    /// A map of `triangles` over nodes whose positions in space are `points`, and in the plane `uv`.
     ///
     /// # Panics
-    /// Where a triangle names a node that does not exist.
+    /// Where there are not as many `uv` as `points`, or a triangle names a node that does not exist.
     pub fn new(points: Vec<Vec3>, uv: Vec<[f64; 2]>, triangles: Vec<[u32; 3]>) -> Self {
         assert_eq!(points.len(), uv.len(), "every node has both places");
         let in_space = triangle_bvh(triangles.iter().map(|t| t.map(|n| points[n as usize])));
         Self { points, uv, triangles, in_space, in_plane: OnceLock::new() }
     }
 
-    /// The places of the nodes in space.
+    /// The positions of the nodes in space.
     pub fn points(&self) -> &[Vec3] {
         &self.points
     }
 
-    /// The places of the nodes in the plane.
+    /// The positions of the nodes in the plane.
     pub fn uv(&self) -> &[[f64; 2]] {
         &self.uv
     }
