@@ -100,6 +100,17 @@ impl GridVector {
 
 /// The middle Bezier point `2 m - (p + q) / 2` of the arc from `p` through `m` to `q`, relative to `origin`.
 /// Exact when `p` and `q` lie on the grid of vertices.
+///
+/// ```
+/// use planish_core::grid::{GridPoint, bezier_control};
+///
+/// let (p, q) = (GridPoint::vertex([0.0, 0.0]), GridPoint::vertex([1.0, 0.0]));
+/// // On the chord, the middle node is the middle control point; above it, that is twice as high.
+/// let straight = bezier_control(p, p.midpoint(q), q, p);
+/// assert_eq!((straight.x, straight.y), (p.midpoint(q).x, 0));
+/// let m = GridPoint::mid([0.5, 0.125]);
+/// assert_eq!(bezier_control(p, m, q, p).y, 2 * m.y);
+/// ```
 pub fn bezier_control(p: GridPoint, m: GridPoint, q: GridPoint, origin: GridPoint) -> GridVector {
     let (p, m, q) = (p.from_origin(origin), m.from_origin(origin), q.from_origin(origin));
     GridVector { x: 2 * m.x - (p.x + q.x) / 2, y: 2 * m.y - (p.y + q.y) / 2 }

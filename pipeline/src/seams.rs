@@ -24,6 +24,27 @@ use crate::topology::{ChartId, CurveId, HalfEdgeId, VertexId};
 use crate::vec3::distance;
 
 /// All curves of an atlas.
+///
+/// ```
+/// use planish_core::decompose::assemble;
+/// use planish_core::seams::SeamNetwork;
+/// use planish_core::topology::ChartId;
+/// use planish_core::{repair, shapes};
+///
+/// // A disk of radius 1, cut along its diameter.
+/// let mesh = repair(&shapes::flat_disk(4), &repair::Settings::default())?.mesh;
+/// let is_upper = |face: usize| mesh.corners(face).iter().map(|p| p[1]).sum::<f64>() > 0.0;
+/// let labels: Vec<u32> = (0..mesh.triangles().len()).map(|f| u32::from(is_upper(f))).collect();
+/// let atlas = assemble(&mesh, &labels)?;
+/// let network = SeamNetwork::new(&mesh, atlas.charts(), 0.0);
+/// assert_eq!((network.curves().len(), network.points().len()), (3, 2), "the seam, and half a circle on either side");
+/// let seam = network.seams().next().expect("there is one");
+/// assert!((seam.length() - 2.0).abs() < 1e-12 && seam.segments() == 8 && seam.sides().len() == 2);
+/// assert_eq!(network.neighbours(ChartId(0)), [ChartId(1)]);
+/// // The loop of a chart passes two curves: the seam, and its open boundary.
+/// assert_eq!(network.loops(ChartId(0))[0].len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct SeamNetwork {
     curves: Vec<Curve>,
@@ -154,6 +175,7 @@ impl SeamNetwork {
             let mut taken: Vec<u32> = neighbours.iter().filter_map(|c| colours.get(c.index()).copied()).collect();
             taken.sort_unstable();
             taken.dedup();
+            // Sorted and without repetitions: the first number that is not at its own position is missing from it.
             colours.push(taken.iter().zip(0..).find(|(t, i)| **t != *i).map_or(taken.len() as u32, |(_, i)| i));
         }
         colours
@@ -241,6 +263,7 @@ impl Boundary {
         ends.sort_unstable();
         let mut corner = vec![false; self.welded];
         for at in ends.chunk_by(|a, b| a.0 == b.0) {
+            // Two segments meet, with the same charts beside both, and no chart is there twice.
             let runs_on = at.len() == 2 && self.charts(at[0].1).eq(self.charts(at[1].1)) && self.charts_once(at[0].1);
             corner[at[0].0 as usize] = !runs_on;
         }
@@ -337,6 +360,7 @@ impl<'a> Tracer<'a> {
     fn begin(&mut self, run: &[usize]) -> CurveId {
         let id = CurveId::at(self.network.curves.len());
         let ends = |s: &usize| self.boundary.steps[*s].ends;
+        // Of every half-edge the begin, and of the last one the end, too.
         let last = run.iter().rev().take(1).map(|s| ends(s)[1]);
         let vertices: Vec<VertexId> = run.iter().map(|s| ends(s)[0]).chain(last).collect();
         for (position, s) in run.iter().enumerate() {

@@ -5,10 +5,21 @@
 use crate::mesh::TriangleSoup;
 use crate::vec3::Vec3;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// The soup of `points` and `triangles`, which the makers below know to be sound.
 fn soup(points: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> TriangleSoup {
     TriangleSoup::new(points, triangles).expect("procedural shapes are sound")
+}
+
+/// All pairs of an element of `outer` and one of `inner`; the second one runs faster.
+fn pairs(outer: Range<u32>, inner: Range<u32>) -> impl Iterator<Item = (u32, u32)> {
+    outer.flat_map(move |i| inner.clone().map(move |j| (i, j)))
+}
+
+/// The two triangles into which the diagonal from the first corner to the third one cuts a square.
+fn halves([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
+    [[a, b, c], [a, c, d]]
 }
 
 /// Points of the unit disk on `rings` rings of 6, 12, 18, ... points around a centre, and the triangles between
@@ -21,19 +32,25 @@ fn ring_disk(rings: u32) -> (Vec<[f64; 2]>, Vec<[u32; 3]>) {
             points.push([r * angle.cos(), r * angle.sin()]);
         }
     }
-    let first = |i: u32| if i == 0 { 0 } else { 1 + 3 * i * (i - 1) };
-    let at = |i: u32, j: u32| first(i) + if i == 0 { 0 } else { j % (6 * i) };
     let mut triangles = Vec::new();
     for i in 1..=rings {
-        for (sector, k) in (0..6).flat_map(|s| (0..i).map(move |k| (s, k))) {
+        for (sector, k) in pairs(0..6, 0..i) {
+            // A sector has i edges on this ring and i - 1 on the one inside it.
             let (outer, inner) = (sector * i + k, sector * (i - 1) + k);
-            triangles.push([at(i - 1, inner), at(i, outer), at(i, outer + 1)]);
+            let [a, b] = [on_ring(i, outer), on_ring(i, outer + 1)];
+            let c = on_ring(i - 1, inner);
+            triangles.push([c, a, b]);
             if k + 1 < i {
-                triangles.push([at(i - 1, inner), at(i, outer + 1), at(i - 1, inner + 1)]);
+                triangles.push([c, b, on_ring(i - 1, inner + 1)]);
             }
         }
     }
     (points, triangles)
+}
+
+/// The number of point `j` on ring `i` of a disk: the centre comes first, then ring after ring, the `k`-th of 6 `k` points.
+fn on_ring(i: u32, j: u32) -> u32 {
+    if i == 0 { 0 } else { 1 + 3 * i * (i - 1) + j % (6 * i) }
 }
 
 /// A gently curved disk: `rings` rings of triangles, 6 `rings`^2 in all.
@@ -58,7 +75,7 @@ pub fn tube(around: u32, rows: u32, height: f64) -> TriangleSoup {
     let quad = |k: u32| {
         let (row, a, b) = (k / around * around, k % around, (k + 1) % around);
         let [a, b, c, d] = [row + a, row + b, row + around + b, row + around + a];
-        [[a, b, c], [a, c, d]]
+        halves([a, b, c, d])
     };
     soup((0..around * (rows + 1)).map(point).collect(), (0..around * rows).flat_map(quad).collect())
 }
@@ -87,11 +104,8 @@ pub fn disk_with_holes(n: u32, holes: u32) -> TriangleSoup {
     };
     let at = |i: u32, j: u32| i * (n + 1) + j;
     let mut triangles = Vec::new();
-    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-        if !in_hole(i, j) {
-            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
-        }
+    for (i, j) in pairs(0..n, 0..n).filter(|(i, j)| !in_hole(*i, *j)) {
+        triangles.extend(halves([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
     }
     let coordinate = |k: u32| 2.0 * f64::from(k) / f64::from(n) - 1.0;
     let point = |k: u32| (coordinate(k / (n + 1)), coordinate(k % (n + 1)));
@@ -169,16 +183,15 @@ pub fn cracked_patch() -> TriangleSoup {
     let mut triangles = Vec::new();
     for half in 0..2 {
         let base = points.len() as u32;
-        for (i, j) in (0..=n / 2).flat_map(|i| (0..=n).map(move |j| (i, j))) {
+        for (i, j) in pairs(0..n / 2 + 1, 0..n + 1) {
             let (x, y) = (f64::from(half * n / 2 + i) / f64::from(n), f64::from(j) / f64::from(n));
             let on_cut = half == 1 && i == 0;
             let gap = if on_cut { 2e-7 * (1.0 + f64::from(j % 3)) } else { 0.0 };
             points.push([x + gap, y, height(x, y) - gap]);
         }
         let at = |i: u32, j: u32| base + i * (n + 1) + j;
-        for (i, j) in (0..n / 2).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        for (i, j) in pairs(0..n / 2, 0..n) {
+            triangles.extend(halves([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
         }
     }
     soup(points, triangles)
@@ -188,7 +201,7 @@ pub fn cracked_patch() -> TriangleSoup {
 pub fn sphere(n: u32) -> TriangleSoup {
     let m = 2 * n;
     let mut points = vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
-    for (i, j) in (1..n).flat_map(|i| (0..m).map(move |j| (i, j))) {
+    for (i, j) in pairs(1..n, 0..m) {
         let (polar, angle) = (0.5 * TAU * f64::from(i) / f64::from(n), TAU * f64::from(j) / f64::from(m));
         points.push([polar.sin() * angle.cos(), polar.sin() * angle.sin(), polar.cos()]);
     }
@@ -197,8 +210,7 @@ pub fn sphere(n: u32) -> TriangleSoup {
     for j in 0..m {
         triangles.extend([[0, at(1, j), at(1, j + 1)], [1, at(n - 1, j + 1), at(n - 1, j)]]);
         for i in 1..n - 1 {
-            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            triangles.extend(halves([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
         }
     }
     soup(points, triangles)
@@ -211,12 +223,14 @@ pub fn ring_torus(n: u32, m: u32) -> TriangleSoup {
         let r = 1.0 + 0.4 * tube.cos();
         [r * around.cos(), r * around.sin(), 0.4 * tube.sin()]
     };
-    let points = (0..n).flat_map(|i| (0..m).map(move |j| point(i, j))).collect();
+    let points = pairs(0..n, 0..m).map(|(i, j)| point(i, j)).collect();
+    // Both ways around, the last row is followed by the first one.
     let at = |i: u32, j: u32| i % n * m + j % m;
-    let squares = (0..n).flat_map(|i| (0..m).map(move |j| (i, j)));
-    let halves = squares
-        .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]);
-    soup(points, halves.collect())
+    let mut triangles = Vec::new();
+    for (i, j) in pairs(0..n, 0..m) {
+        triangles.extend(halves([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
+    }
+    soup(points, triangles)
 }
 
 /// A book: `pages` (at least 3) bent rectangles of `n` x `n` squares that meet in a straight spine, which is not
@@ -232,11 +246,14 @@ pub fn book(pages: u32, n: u32) -> TriangleSoup {
     let mut triangles = Vec::new();
     for page in 0..pages {
         let base = points.len() as u32;
-        points.extend((1..=n).flat_map(|i| (0..=n).map(move |j| point(page, i, j))));
+        points.extend(pairs(1..n + 1, 0..n + 1).map(|(i, j)| point(page, i, j)));
         let at = |i: u32, j: u32| if i == 0 { j } else { base + (i - 1) * (n + 1) + j };
-        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
-            triangles.extend(if page % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
+        for (i, j) in pairs(0..n, 0..n) {
+            let mut square = halves([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+            if page % 2 == 1 {
+                square.iter_mut().for_each(|t| t.swap(1, 2));
+            }
+            triangles.extend(square);
         }
     }
     soup(points, triangles)
@@ -252,7 +269,7 @@ pub fn finger(around: u32, length: u32) -> TriangleSoup {
         let radius = if k == 0 { 1.5 } else { 0.5 };
         (radius, 1.0 * (height - f64::from(u32::from(k > 0)) / f64::from(around / 3)))
     };
-    for (k, j) in (0..rings).flat_map(|k| (0..around).map(move |j| (k, j))) {
+    for (k, j) in pairs(0..rings, 0..around) {
         let (radius, z) = ring(k);
         let angle = TAU * (f64::from(j) + 0.5 * f64::from(k % 2)) / f64::from(around);
         points.push([radius * angle.cos(), radius * angle.sin(), z]);
@@ -261,12 +278,11 @@ pub fn finger(around: u32, length: u32) -> TriangleSoup {
     points.push([0.0, 0.0, ring(rings - 1).1 + 0.2]);
     let at = |k: u32, j: u32| k * around + j % around;
     let mut triangles = Vec::new();
-    for (k, j) in (0..rings - 1).flat_map(|k| (0..around).map(move |j| (k, j))) {
-        if k % 2 == 0 {
-            triangles.extend([[at(k, j), at(k, j + 1), at(k + 1, j)], [at(k, j + 1), at(k + 1, j + 1), at(k + 1, j)]]);
-        } else {
-            triangles.extend([[at(k, j), at(k, j + 1), at(k + 1, j + 1)], [at(k, j), at(k + 1, j + 1), at(k + 1, j)]]);
-        }
+    for (k, j) in pairs(0..rings - 1, 0..around) {
+        let [a, b] = [at(k, j), at(k, j + 1)];
+        let [d, c] = [at(k + 1, j), at(k + 1, j + 1)];
+        // Every second ring is turned by half a step: the shorter diagonal changes.
+        triangles.extend(if k % 2 == 0 { [[a, b, d], [b, c, d]] } else { halves([a, b, c, d]) });
     }
     triangles.extend((0..around).map(|j| [at(rings - 1, j), at(rings - 1, j + 1), tip]));
     soup(points, triangles)

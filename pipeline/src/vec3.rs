@@ -44,6 +44,15 @@ pub(crate) fn bits_of(p: Vec3) -> [u64; 3] {
 }
 
 /// An axis-aligned box.
+///
+/// ```
+/// use planish_core::vec3::BoundingBox;
+///
+/// let around = BoundingBox::of([[0.0, 4.0, 1.0], [3.0, 0.0, 1.0]]).expect("there are points");
+/// assert_eq!((around.min, around.max), ([0.0, 0.0, 1.0], [3.0, 4.0, 1.0]));
+/// assert_eq!(around.diagonal(), 5.0);
+/// assert_eq!(BoundingBox::of([]), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundingBox {
     /// Least coordinates.
@@ -77,6 +86,16 @@ impl BoundingBox {
 
 /// The power of two that brings `length` into `[0.5, 1)`: multiplying by it is exact, so that results do not
 /// depend on the unit of the input. It is 1 for a length of zero.
+///
+/// ```
+/// use planish_core::vec3::unit_scale;
+///
+/// assert_eq!(unit_scale(5.0), 0.125, "5 / 8 lies between 0.5 and 1");
+/// assert_eq!(unit_scale(0.3), 2.0);
+/// // No digit is lost on the way there and back.
+/// let length = 1.0 / 3.0e7;
+/// assert_eq!(length * unit_scale(length) / unit_scale(length), length);
+/// ```
 pub fn unit_scale(length: f64) -> f64 {
     if length <= 0.0 || !length.is_finite() {
         return 1.0;

@@ -10,6 +10,20 @@ use crate::topology::{ChartId, FaceId, HalfEdgeId, VertexId};
 ///
 /// # Errors
 /// [`Illegal`], for the first chart that is no disk with or without holes.
+///
+/// ```
+/// use planish_core::decompose::{Illegal, assemble};
+/// use planish_core::{repair, shapes};
+///
+/// let mesh = repair(&shapes::sphere(8), &repair::Settings::default())?.mesh;
+/// let is_north = |face: usize| mesh.corners(face).iter().map(|p| p[2]).sum::<f64>() > 0.0;
+/// let labels: Vec<u32> = (0..mesh.triangles().len()).map(|f| u32::from(is_north(f))).collect();
+/// assert_eq!(assemble(&mesh, &labels)?.charts().len(), 2);
+/// // The whole sphere has no boundary: it is no chart.
+/// let whole = assemble(&mesh, &vec![0; labels.len()]);
+/// assert!(matches!(whole, Err(Illegal::Topology { loops: 0, euler: 2, .. })));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn assemble(mesh: &SurfaceMesh, labels: &[u32]) -> Result<Atlas, Illegal> {
     let sets = by_label(labels);
     let mut places = Places::new(mesh, &sets);
@@ -17,21 +31,32 @@ pub fn assemble(mesh: &SurfaceMesh, labels: &[u32]) -> Result<Atlas, Illegal> {
     Ok(Atlas { charts: charts.collect::<Result<_, _>>()?, feature_edges: 0 })
 }
 
-/// Where faces and vertices are in their charts.
+/// What a face or a vertex of the surface is in a chart.
+#[derive(Clone, Copy)]
+struct Local {
+    chart: u32,
+    /// Its number in the chart.
+    number: u32,
+}
+
+/// Where faces and vertices are in their charts. One table serves all charts: nothing is allocated chart by chart.
 struct Places {
-    /// Per face its chart and its place there.
-    faces: Vec<(u32, u32)>,
-    /// Per vertex its place in the chart where it was met last, and that chart.
-    vertices: Vec<(u32, u32)>,
+    /// Per face, where it is.
+    faces: Vec<Local>,
+    /// Per vertex, where it is in the chart that was entered last among those that have it.
+    vertices: Vec<Local>,
 }
 
 impl Places {
     fn new(mesh: &SurfaceMesh, sets: &[Vec<FaceId>]) -> Self {
-        let mut faces = vec![(0, 0); mesh.triangles().len()];
+        let mut faces = vec![Local { chart: 0, number: 0 }; mesh.triangles().len()];
         for (set, chart) in sets.iter().zip(0..) {
-            set.iter().zip(0..).for_each(|(f, place)| faces[f.index()] = (chart, place));
+            for (face, number) in set.iter().zip(0..) {
+                faces[face.index()] = Local { chart, number };
+            }
         }
-        Self { faces, vertices: vec![(u32::MAX, 0); mesh.points().len()] }
+        let nowhere = Local { chart: u32::MAX, number: 0 };
+        Self { faces, vertices: vec![nowhere; mesh.points().len()] }
     }
 
     /// The vertices of a chart, ascending; from now on their places are those in it.
@@ -39,14 +64,22 @@ impl Places {
         let mut vertices = Vec::new();
         for v in faces.iter().flat_map(|f| mesh.triangles()[f.index()]) {
             let place = &mut self.vertices[v.index()];
-            if place.0 != chart.0 {
-                place.0 = chart.0;
+            if place.chart != chart.0 {
+                place.chart = chart.0;
                 vertices.push(v);
             }
         }
         vertices.sort_unstable();
-        vertices.iter().zip(0..).for_each(|(v, place)| self.vertices[v.index()].1 = place);
+        for (v, number) in vertices.iter().zip(0..) {
+            self.vertices[v.index()].number = number;
+        }
         vertices
+    }
+
+    /// The face as one of a chart; none where it belongs to another one.
+    fn face_in(&self, chart: ChartId, face: FaceId) -> Option<FaceId> {
+        let local = self.faces[face.index()];
+        (local.chart == chart.0).then_some(FaceId(local.number))
     }
 }
 
@@ -72,21 +105,32 @@ fn by_label(labels: &[u32]) -> Vec<Vec<FaceId>> {
 /// [`Illegal`] where they form none.
 fn chart(mesh: &SurfaceMesh, id: ChartId, faces: Vec<FaceId>, places: &mut Places) -> Result<Chart, Illegal> {
     let vertices = places.enter(mesh, id, &faces);
-    let local = |v: VertexId| VertexId(places.vertices[v.index()].1);
+    let local = |v: VertexId| VertexId(places.vertices[v.index()].number);
     let triangles: Vec<_> = faces.iter().map(|f| mesh.triangles()[f.index()].map(local)).collect();
-    let inside = |f: FaceId| Some(places.faces[f.index()]).filter(|p| p.0 == id.0).map(|p| FaceId(p.1));
-    let edges = mesh.edges().part(&faces, inside);
+    let edges = mesh.edges().part(&faces, |face| places.face_in(id, face));
     let mut loops = legality::verify(id, &triangles, &edges, vertices.len())?;
-    let shapes = faces.iter().map(|f| mesh.metric().shapes[f.index()]).collect();
-    let flagged = faces.iter().map(|f| mesh.metric().flagged[f.index()]).collect();
-    let scale = mesh.metric().scale;
+    let metric = mesh.metric();
+    let shapes = faces.iter().map(|f| metric.shapes[f.index()]).collect();
+    let flagged = faces.iter().map(|f| metric.flagged[f.index()]).collect();
+    let scale = metric.scale;
     let patch = mesh.patch(&vertices, &faces);
     let (outer, holes) = (vec![], vec![]);
     let mut chart = Chart { id, vertices, faces, triangles, shapes, flagged, scale, edges, outer, holes, patch };
-    let length = |l: &[HalfEdgeId]| l.iter().map(|h| chart.length(*h)).sum::<f64>();
-    let lengths: Vec<f64> = loops.iter().map(|l| length(l)).collect();
-    let longest = (0..loops.len()).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
-    chart.outer = loops.remove(longest);
+    // A chart has at least one loop.
+    chart.outer = loops.remove(longest(&chart, &loops));
     chart.holes = loops;
     Ok(chart)
+}
+
+/// Which of the loops is the longest; of those that are as long, the first one.
+fn longest(chart: &Chart, loops: &[Vec<HalfEdgeId>]) -> usize {
+    let mut longest = 0;
+    let mut most = 0.0;
+    for (i, boundary_loop) in loops.iter().enumerate() {
+        let length: f64 = boundary_loop.iter().map(|h| chart.length(*h)).sum();
+        if length > most {
+            (longest, most) = (i, length);
+        }
+    }
+    longest
 }

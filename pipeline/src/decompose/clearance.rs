@@ -8,7 +8,8 @@ use super::network::Network;
 use crate::monitor::Interrupted;
 use crate::topology::dijkstra::ShortestPaths;
 
-/// Two vertices of seams are far apart if the way along these is this many times the way across.
+/// Two vertices of seams are far apart if the way along these is this many times the way across. A half circle is pi / 2 =
+/// 1.6 times as long as the way across it: what is taken for a neck is deeper than that.
 const FAR: f64 = 3.0;
 
 /// The gaps between seams.

@@ -45,6 +45,7 @@ impl<'a> Dual<'a> {
         let points: Vec<Vec3> = mesh.points().iter().map(|p| p.map(|c| c * scale)).collect();
         let triangles = mesh.triangles();
         let from = |h: HalfEdgeId| triangles[h.face().index()][h.side()];
+        // Two half-edges from the same vertex run the same way: their triangles disagree about the orientation.
         let twin = |h: HalfEdgeId| mesh.edges().twin(h).filter(|t| from(*t) != from(h)).unwrap_or(NONE);
         let length = |h: HalfEdgeId| distance(points[from(h).index()], points[from(h.next()).index()]);
         let side = |h| Side { twin: twin(h), from: from(h), length: length(h) };
@@ -81,6 +82,7 @@ impl<'a> Dual<'a> {
         let open = self.half_edges().filter(|h| self.twin(*h).is_none());
         let mut open: Vec<_> = open.map(|h| (place(h), h)).collect();
         open.sort_unstable();
+        // Open half-edges between the same two welded vertices lie at one place.
         let at_one_place = open.chunk_by(|g, h| g.0 == h.0).filter(|all| all.len() > 1);
         let others = |all: &[(_, HalfEdgeId)], h: HalfEdgeId| {
             let others = all.iter().map(|g| g.1).filter(|g| *g != h);

@@ -26,6 +26,22 @@ pub struct WithoutEars {
 ///
 /// # Errors
 /// [`Illegal`]: a fault of planish.
+///
+/// ```
+/// use planish_core::decompose::{Settings, decompose, split_ears};
+/// use planish_core::{mesh::TriangleSoup, monitor::NoMonitor, repair};
+///
+/// // A square of two triangles, each of which has two edges on the boundary.
+/// let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+/// let soup = TriangleSoup::new(points, vec![[0, 1, 2], [0, 2, 3]])?;
+/// let mesh = repair(&soup, &repair::Settings::default())?.mesh;
+/// let atlas = decompose(&mesh, &Settings::default(), &NoMonitor)?;
+/// let without = split_ears(&mesh, &atlas, usize::MAX)?.expect("there are ears");
+/// // One vertex in the middle of the diagonal serves both.
+/// assert_eq!((without.split, without.mesh.triangles().len()), (1, 4));
+/// assert_eq!(without.mesh.area(), mesh.area());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn split_ears(mesh: &SurfaceMesh, atlas: &Atlas, max_triangles: usize) -> Result<Option<WithoutEars>, Illegal> {
     let mut work = Work::new(mesh, atlas, max_triangles);
     let mut mesh = mesh.clone();

@@ -20,10 +20,12 @@ use crate::vec3::{Vec3, dot, norm};
 /// The lower threshold, as a share of the upper one: 25 of 40 degrees.
 const LOWER: f64 = 0.625;
 
-/// The triangles that make up a side of an edge.
+/// The triangles that make up a side of an edge, by experience: fewer follow the normals of single slivers, more reach
+/// around narrow faces to what lies behind them.
 const SIDE: usize = 12;
 
-/// The least length of connected features, as a share of the size of the surface (the square root of its area).
+/// The least length of connected features, as a share of the size of the surface (the square root of its area). By
+/// experience: smaller takes noise for creases, larger overlooks short ones.
 const MIN_LENGTH: f64 = 0.06;
 
 /// The least outline of a patch between features, likewise, weighed by the sharpness of the features: 1 minus the cosine
@@ -117,7 +119,8 @@ fn sharpness_between(dual: &Dual, sides: &[Vec<FaceId>; 2], normals: &[Vec3], er
         return 1.0 - cos;
     }
     let doubt = doubt(dual, &sides[0], m, error) + doubt(dual, &sides[1], n, error);
-    1.0 - (cos.clamp(-1.0, 1.0).acos() - doubt).max(0.0).cos()
+    let angle = cos.clamp(-1.0, 1.0).acos();
+    1.0 - (angle - doubt).max(0.0).cos()
 }
 
 /// Unites each patch that is too small to be a face with the neighbour with which it shares most: the features between
@@ -126,16 +129,23 @@ fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId]) -> bool {
     let (patch_of, count) = patches(dual);
     let patch = |h: HalfEdgeId| patch_of[h.face().index()] as usize;
     let small = small_patches(dual, &patch_of, count);
-    let both = features.iter().flat_map(|h| [Some(*h), dual.twin(*h)]).flatten();
-    let pairs = both.filter_map(|h| Some((patch(h), patch(dual.twin(h)?), dual.length(h))));
-    let mut between: Vec<_> = pairs.filter(|(a, b, _)| a != b && small[*a]).collect();
-    between.sort_unstable_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)).then(x.2.total_cmp(&y.2)));
-    let mut united = UnionFind::new(count);
-    for of_patch in between.chunk_by(|x, y| x.0 == y.0) {
-        let shared = of_patch.chunk_by(|x, y| x.1 == y.1).map(|c| (c.iter().map(|b| b.2).sum::<f64>(), c[0].1));
-        if let Some((_, neighbour)) = shared.max_by(|x, y| x.0.total_cmp(&y.0).then(y.1.cmp(&x.1))) {
-            united.merge(of_patch[0].0, neighbour);
+    // Each feature, seen from either of its sides that is small.
+    let mut borders: Vec<Border> = Vec::new();
+    for h in features.iter().flat_map(|h| [Some(*h), dual.twin(*h)]).flatten() {
+        let Some(twin) = dual.twin(h) else { continue };
+        let border = Border { patch: patch(h), neighbour: patch(twin), length: dual.length(h) };
+        if border.patch != border.neighbour && small[border.patch] {
+            borders.push(border);
         }
+    }
+    // By lengths, too, so that sums do not depend on the numbering of the edges.
+    borders.sort_unstable_by(|x, y| {
+        let pairs = (x.patch, x.neighbour).cmp(&(y.patch, y.neighbour));
+        pairs.then(x.length.total_cmp(&y.length))
+    });
+    let mut united = UnionFind::new(count);
+    for of_patch in borders.chunk_by(|x, y| x.patch == y.patch) {
+        united.merge(of_patch[0].patch, nearest_neighbour(of_patch));
     }
     for h in features {
         let Some(t) = dual.twin(*h).filter(|t| patch(*t) != patch(*h)) else { continue };
@@ -144,23 +154,49 @@ fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId]) -> bool {
             dual.sharpness[edge] = 0.0;
         }
     }
-    !between.is_empty()
+    !borders.is_empty()
+}
+
+/// A feature edge between a small patch and another one.
+#[derive(Clone, Copy)]
+struct Border {
+    patch: usize,
+    neighbour: usize,
+    length: f64,
+}
+
+/// The neighbour with which a patch shares most, out of its borders, sorted by neighbours; of those that share as much, the
+/// first one.
+fn nearest_neighbour(borders: &[Border]) -> usize {
+    let mut nearest = borders[0].neighbour;
+    let mut most = f64::NEG_INFINITY;
+    for shared in borders.chunk_by(|x, y| x.neighbour == y.neighbour) {
+        let length: f64 = shared.iter().map(|border| border.length).sum();
+        if length > most {
+            (nearest, most) = (shared[0].neighbour, length);
+        }
+    }
+    nearest
 }
 
 /// Per patch, whether its outline, weighed by its sharpness, is too short for a face, or whether it is a bevel.
 fn small_patches(dual: &Dual, patch_of: &[u32], count: usize) -> Vec<bool> {
-    let (mut areas, mut outlines, mut weighed) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
+    let mut areas = vec![0.0; count];
+    let mut outlines = vec![0.0; count];
+    let mut weighed = vec![0.0; count];
     for (f, patch) in patch_of.iter().enumerate() {
         areas[*patch as usize] += dual.area(f);
     }
     let patches = Partition::new(dual, patch_of);
     for h in patches.boundary() {
         let patch = patches.label(h) as usize;
+        // Where the surface ends, the outline counts in full.
         let sharpness = if patches.is_seam(h) { dual.sharpness(h) } else { 1.0 };
         outlines[patch] += dual.length(h);
         weighed[patch] += sharpness * dual.length(h);
     }
     let (least, width) = (min_outline(dual), MIN_WIDTH * dual.total_area().sqrt());
+    // A long strip of width w and length l has the area w l and an outline of about 2 l.
     let is_bevel = |p: usize| 2.0 * areas[p] < width * outlines[p] && weighed[p] < BLUNT * outlines[p];
     (0..count).map(|p| weighed[p] < least || is_bevel(p)).collect()
 }

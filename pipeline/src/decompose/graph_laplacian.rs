@@ -126,6 +126,7 @@ impl Factor {
     }
 
     fn solve(&self, mut x: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+        // L y = x, column by column; then, from the last unknown back, D L^T x = y.
         for i in 0..x.len() {
             let y = x[i];
             self.columns.row(i).iter().for_each(|(j, l)| (0..2).for_each(|k| x[*j as usize][k] -= l * y[k]));

@@ -75,6 +75,7 @@ pub fn verify(
     }
     let loops = boundary_loops.len();
     let euler = vertices as i64 - edges.len() as i64 + triangles.len() as i64;
+    // Euler number = 2 - 2 genus - loops.
     if loops == 0 || euler + loops as i64 != 2 {
         return Err(Illegal::Topology { chart, loops, euler });
     }

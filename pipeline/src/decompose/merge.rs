@@ -90,9 +90,11 @@ impl Merge<'_, '_> {
         }
         while let Some(best) = heap.pop() {
             let (a, b) = best.pair;
+            // One of the regions has grown since: that union has a candidate of its own.
             if best.versions != (version[a as usize], version[b as usize]) {
                 continue;
             }
+            // The estimate was from below: with its own ratio the union waits again, and is made if it is the cheapest still.
             let Some(ratio) = best.ratio else {
                 heap.extend(self.evaluated(best));
                 let cells = [a, b].map(|r| self.regions.all[r as usize].cells.len());
@@ -148,7 +150,9 @@ impl Merge<'_, '_> {
     fn cost(&self, (a, b): (u32, u32), union: &Union, ratio: f64) -> f64 {
         let outline = |r: u32| self.regions.all[r as usize].length;
         let region = &union.region;
+        // Against the circumference of a round disk of the same area.
         let excess = region.length / (4.0 * PI * region.area).sqrt() - 1.0;
+        // Area vectors are twice as long as areas are large: those of a plane add up to that, those of a sphere to nothing.
         let spread = 1.0 - norm(region.normal) / (2.0 * region.area);
         let w = &self.weights;
         w.ratio * ratio.log10() + w.roundness * excess.max(0.0) + w.spread * spread

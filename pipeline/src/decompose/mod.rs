@@ -74,6 +74,19 @@ pub enum Error {
 }
 
 /// What charts must respect.
+///
+/// ```
+/// use planish_core::decompose::{Settings, decompose};
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{repair, shapes};
+///
+/// // A square duct: a disk with a hole, but with four sharp edges along it.
+/// let mesh = repair(&shapes::tube(4, 6, 3.0), &repair::Settings::default())?.mesh;
+/// let charts = |settings: Settings| decompose(&mesh, &settings, &NoMonitor).map(|a| a.charts().len());
+/// assert_eq!(charts(Settings::default())?, 4);
+/// assert_eq!(charts(Settings { feature_angle: None, ..Settings::default() })?, 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The largest area ratio of a chart (see [`crate::measure::distortion::Summary::area_ratio`]). At least 10; default 1e6.
@@ -97,6 +110,19 @@ impl Default for Settings {
 ///
 /// # Errors
 /// [`Error`].
+///
+/// ```
+/// use planish_core::decompose::{Settings, decompose};
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{repair, shapes};
+///
+/// let mesh = repair(&shapes::sphere(8), &repair::Settings::default())?.mesh;
+/// let atlas = decompose(&mesh, &Settings::default(), &NoMonitor)?;
+/// assert_eq!(atlas.charts().len(), 2, "a closed surface is no disk");
+/// let triangles: usize = atlas.charts().iter().map(|c| c.triangles().len()).sum();
+/// assert_eq!(triangles, mesh.triangles().len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, monitor: &dyn Monitor) -> Result<Atlas, Error> {
     let (dual, features) = with_features(mesh, settings, monitor)?;
     let limits = Limits::new(settings);
@@ -142,10 +168,10 @@ fn cells(dual: &Dual, limits: &Limits) -> Result<(Cells, Complex), Interrupted> 
 }
 
 /// Charts grow up to this share of the decades of the largest area ratio: the prediction is not exact, and straight
-/// seams change it.
+/// seams change it. By experience: larger leads to charts that must be split once they are mapped, smaller to more charts.
 const MARGIN: f64 = 0.85;
 
-/// Cells per component, at most.
+/// Cells per component, at most. By experience: more follow the shape more closely, and every prediction costs more.
 const CELLS: usize = 800;
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use super::voronoi::{Cells, Graph, nearest, seeds};
 use crate::monitor::{Checkpoint, Interrupted};
 use crate::topology::csr::Csr;
 
-/// Patches to a cell.
+/// Patches to a cell. By experience: more place seeds more evenly, fewer are searched faster.
 const SAMPLES: usize = 16;
 
 const NONE: u32 = u32::MAX;

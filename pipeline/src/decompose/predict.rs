@@ -35,6 +35,16 @@ struct Link {
     feature: bool,
 }
 
+/// A half-arc between two cells.
+#[derive(Clone, Copy)]
+struct Contact {
+    /// Its own cell, and the one beyond.
+    cells: (u32, u32),
+    length: f64,
+    /// How much of the length is a feature.
+    feature: f64,
+}
+
 impl CellGraph {
     pub(super) fn new(complex: &Complex) -> Self {
         let centroids: Vec<Vec3> = complex.cells.iter().map(|c| c.centroid).collect();
@@ -42,17 +52,23 @@ impl CellGraph {
         let count = complex.cells.len();
         let mut graph = Self { centroids, areas, links: Csr::default(), rank: Vec::new() };
         let inner = complex.arcs.iter().filter(|a| a.twin != NONE);
-        let mut pairs: Vec<(u32, u32, f64, f64)> =
-            inner.map(|a| (a.cell, complex.arcs[a.twin as usize].cell, a.length, a.feature)).collect();
-        pairs.sort_unstable_by(|x, y| (x.0, x.1).cmp(&(y.0, y.1)).then(x.2.total_cmp(&y.2)));
-        let link = |run: &[(u32, u32, f64, f64)]| {
-            let (a, b, ..) = run[0];
-            let length: f64 = run.iter().map(|pair| pair.2).sum();
-            let sharp: f64 = run.iter().map(|pair| pair.3).sum();
-            let distance = graph.spacing(a, b);
-            (a, Link { to: b, conductance: length / distance, distance, feature: 2.0 * sharp > length })
-        };
-        let links: Vec<(u32, Link)> = pairs.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)).map(link).collect();
+        let mut contacts = Vec::with_capacity(complex.arcs.len());
+        for arc in inner {
+            let beyond = complex.arcs[arc.twin as usize].cell;
+            contacts.push(Contact { cells: (arc.cell, beyond), length: arc.length, feature: arc.feature });
+        }
+        // By lengths, too, so that sums do not depend on the numbering of the arcs.
+        contacts.sort_unstable_by(|x, y| x.cells.cmp(&y.cells).then(x.length.total_cmp(&y.length)));
+        let mut links: Vec<(u32, Link)> = Vec::new();
+        for run in contacts.chunk_by(|x, y| x.cells == y.cells) {
+            let (from, to) = run[0].cells;
+            let length: f64 = run.iter().map(|contact| contact.length).sum();
+            let sharp: f64 = run.iter().map(|contact| contact.feature).sum();
+            let distance = graph.spacing(from, to);
+            // As of a strip as wide as the common edge is long, from one centroid to the other.
+            let conductance = length / distance;
+            links.push((from, Link { to, conductance, distance, feature: 2.0 * sharp > length }));
+        }
         graph.links = Csr::sorted(count, || links.iter().copied());
         graph.rank = graph.dissected();
         graph
@@ -147,8 +163,10 @@ fn runs(complex: &Complex, boundary_loop: &[u32]) -> Vec<Run> {
     let arc = |a: &u32| &complex.arcs[*a as usize];
     let total: f64 = boundary_loop.iter().map(|a| arc(a).length).sum();
     let mut travelled = 0.0;
-    let run = |run: &[u32]| {
+    let mut runs = Vec::new();
+    for run in boundary_loop.chunk_by(|a, b| arc(a).cell == arc(b).cell) {
         let length: f64 = run.iter().map(|a| arc(a).length).sum();
+        // The half-arc on which the first half of the length ends; rounding may leave none.
         let mut left = 0.5 * length;
         let half_way = run.iter().find(|a| {
             left -= arc(a).length;
@@ -156,9 +174,10 @@ fn runs(complex: &Complex, boundary_loop: &[u32]) -> Vec<Run> {
         });
         let at = (travelled + 0.5 * length) / total;
         travelled += length;
-        Run { cell: arc(&run[0]).cell, length, middle: arc(half_way.unwrap_or(&run[0])).middle, at }
-    };
-    boundary_loop.chunk_by(|a, b| arc(a).cell == arc(b).cell).map(run).collect()
+        let middle = arc(half_way.unwrap_or(&run[0])).middle;
+        runs.push(Run { cell: arc(&run[0]).cell, length, middle, at });
+    }
+    runs
 }
 
 /// The system of one union.
@@ -173,7 +192,7 @@ struct System<'a> {
     rim: Vec<(u32, f64, [f64; 2])>,
 }
 
-/// Loops shorter than this share of the longest are never the outer one.
+/// Loops shorter than this share of the longest are never the outer one. Each that may be costs a map.
 const LONG: f64 = 0.5;
 
 /// What a harmonic map of some cells would be like.

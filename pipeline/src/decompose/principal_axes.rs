@@ -20,8 +20,11 @@ const SWEEPS: usize = 8;
 pub(super) fn principal_axes(complex: &Complex, components: &Cells) -> Vec<Axes> {
     let mut spread = vec![[[0.0; 3]; 3]; components.len];
     for (cell, component) in complex.cells.iter().zip(&components.labels) {
+        let spread = &mut spread[*component as usize];
+        // Each factor n grows with the area of the cell: over the area, a cell counts by that once.
+        let area = cell.area.max(f64::MIN_POSITIVE);
         for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
-            spread[*component as usize][i][j] += cell.normal[i] * cell.normal[j] / cell.area.max(f64::MIN_POSITIVE);
+            spread[i][j] += cell.normal[i] * cell.normal[j] / area;
         }
     }
     spread.into_iter().map(eigenvectors).collect()
@@ -31,7 +34,9 @@ pub(super) fn principal_axes(complex: &Complex, components: &Cells) -> Vec<Axes>
 fn eigenvectors(mut a: [Vec3; 3]) -> Axes {
     let mut vectors = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for (p, q) in [(0, 1), (0, 2), (1, 2)].repeat(SWEEPS) {
-        let (sin, cos) = (0.5 * f64::atan2(2.0 * a[p][q], a[q][q] - a[p][p])).sin_cos();
+        // The rotation in the plane of the axes p and q by the angle that makes a[p][q] zero.
+        let angle = 0.5 * f64::atan2(2.0 * a[p][q], a[q][q] - a[p][p]);
+        let (sin, cos) = angle.sin_cos();
         let turn = |x: f64, y: f64| (cos * x - sin * y, sin * x + cos * y);
         for row in &mut a {
             (row[p], row[q]) = turn(row[p], row[q]);
@@ -46,7 +51,7 @@ fn eigenvectors(mut a: [Vec3; 3]) -> Axes {
     order.map(|i| vectors[i])
 }
 
-/// Whether a region faces along this axis.
+/// Whether a region faces along this axis, rather than against it.
 pub(super) fn faces_along(region: &Region, axis: Vec3) -> bool {
     dot(region.normal, axis) > 0.0
 }

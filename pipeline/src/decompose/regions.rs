@@ -101,6 +101,8 @@ impl<'a> Regions<'a> {
             self.all[region].length += self.complex.arcs[arc as usize].length;
             self.all[region].boundary.push(arc);
         }
+        // The Euler number of a union is that of its cells, less the arcs along which they are glued, plus the corners that come
+        // to lie inside: each corner is counted once, and an arc by its lesser half.
         for arc in inner {
             let half = &self.complex.arcs[arc as usize];
             let closed = !std::mem::replace(&mut counted[half.from as usize], true);

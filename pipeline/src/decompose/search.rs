@@ -96,15 +96,37 @@ impl SearchResult {
     }
 }
 
+/// What is added up over the charts of a component.
+#[derive(Clone)]
+struct Sums {
+    charts: usize,
+    /// The length of the seams.
+    seams: f64,
+    area: f64,
+    /// The largest area ratio.
+    worst: f64,
+}
+
+impl Sums {
+    fn score(&self) -> Score {
+        let cost = SEAMS * self.seams / self.area.sqrt() + self.worst.log10();
+        Score { charts: self.charts, cost }
+    }
+}
+
 impl Search<'_> {
+    /// Grows charts by every strategy, for the components that cannot be left whole.
     pub(super) fn run(&self) -> Result<SearchResult, Interrupted> {
         let components = farthest_first(self.graph, |_| 1);
         let whole = Regions::new(self.complex, components.labels.clone(), components.len);
         let whole = self.fine(whole, WHOLE * self.bound)?;
         let mut strategies = vec![components.labels.clone()];
-        let left_whole =
-            |w: &bool| if *w { vec![Ranked { score: Score { charts: 1, cost: 0.0 }, strategy: 0 }] } else { vec![] };
-        let mut ranked: Vec<Vec<Ranked>> = whole.iter().map(left_whole).collect();
+        // The first strategy, of one chart for each component, is open to those that can be left whole, and to them alone.
+        let as_one = Ranked { score: Score { charts: 1, cost: 0.0 }, strategy: 0 };
+        let mut ranked: Vec<Vec<Ranked>> = Vec::with_capacity(whole.len());
+        for is_whole in &whole {
+            ranked.push(if *is_whole { vec![as_one] } else { vec![] });
+        }
         let axes = principal_axes(self.complex, &components);
         for strategy in STRATEGIES.iter().filter(|_| whole.contains(&false)) {
             let (of, scores) = self.grow(strategy, &components, &axes, &whole)?;
@@ -157,6 +179,7 @@ impl Search<'_> {
             regions.all.iter().map(|r| 2 * component(r) + u32::from(is_front(r))).collect::<Vec<u32>>()
         };
         let wholes = regions.all.iter().map(component).collect();
+        // First on either side of the axis, then across.
         let rounds: Vec<Vec<u32>> = strategy.axis.map(side).into_iter().chain([wholes]).collect();
         let mut ratios = vec![1.0; groups.len];
         for groups in rounds {
@@ -189,19 +212,17 @@ impl Search<'_> {
 
     /// The score of every component.
     fn scores(&self, regions: &Regions, ratios: &[f64], components: &Cells) -> Vec<Score> {
-        let mut sums = vec![(0, 0.0, 0.0, 1.0_f64); components.len];
+        let mut sums = vec![Sums { charts: 0, seams: 0.0, area: 0.0, worst: 1.0 }; components.len];
         for (region, ratio) in regions.all.iter().zip(ratios).filter(|(r, _)| !r.cells.is_empty()) {
-            let (charts, seams, area, worst) = &mut sums[components.labels[region.cells[0] as usize] as usize];
-            let seam = region.boundary.iter().map(|a| &self.complex.arcs[*a as usize]).filter(|a| a.twin != NONE);
-            *charts += 1;
-            *seams += 0.5 * seam.map(|a| a.length).sum::<f64>();
-            *area += region.area;
-            *worst = worst.max(*ratio);
+            let sums = &mut sums[components.labels[region.cells[0] as usize] as usize];
+            let arcs = region.boundary.iter().map(|arc| &self.complex.arcs[*arc as usize]);
+            let seam: f64 = arcs.filter(|arc| arc.twin != NONE).map(|arc| arc.length).sum();
+            sums.charts += 1;
+            // The region on the other side counts the other half.
+            sums.seams += 0.5 * seam;
+            sums.area += region.area;
+            sums.worst = sums.worst.max(*ratio);
         }
-        let score = |(charts, seams, area, worst): (usize, f64, f64, f64)| Score {
-            charts,
-            cost: SEAMS * seams / area.sqrt() + worst.log10(),
-        };
-        sums.into_iter().map(score).collect()
+        sums.into_iter().map(|sums| sums.score()).collect()
     }
 }

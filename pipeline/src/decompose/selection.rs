@@ -13,7 +13,7 @@ use super::straighten::{RELAXED, relax};
 use super::voronoi::Cells;
 use crate::monitor::Interrupted;
 
-/// A chart is taken to need at most this many more.
+/// A chart is taken to become this many at most: an infinite ratio, of which no map was found, must not decide alone.
 const MAX_PARTS: f64 = 9.0;
 
 /// The surface on which charts are counted.
@@ -58,14 +58,13 @@ impl Selection<'_> {
     fn needed(&self, found: &SearchResult, tried: &[usize], open: &[bool]) -> Result<Vec<usize>, Interrupted> {
         let charts = found.charts(tried);
         let mut component = vec![0; charts.len];
-        charts
-            .labels
-            .iter()
-            .zip(&found.components.labels)
-            .for_each(|(chart, c)| component[*chart as usize] = *c as usize);
+        for (chart, c) in charts.labels.iter().zip(&found.components.labels) {
+            component[*chart as usize] = *c as usize;
+        }
         let labels = self.cells.labels.iter().map(|c| charts.labels[*c as usize]).collect();
         let mut network = Network::new(self.dual, labels, self.limits).keeping(RELAXED);
         self.dual.checkpoint()?;
+        // Pulled straight without regard to area ratios: these tell below what had to be split for that.
         relax(&mut network, 1.0, |label| open[component[label as usize]])?;
         let mut counts = vec![0; tried.len()];
         for (component, prediction) in component.into_iter().zip(evaluate(&network, self.cells)?) {

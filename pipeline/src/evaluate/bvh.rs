@@ -20,6 +20,19 @@ const BY_CELLS: usize = 31;
 const DEPTH: usize = BY_CELLS + 33;
 
 /// Items by their boxes.
+///
+/// ```
+/// use planish_core::evaluate::Bvh;
+/// use planish_core::vec3::BoundingBox;
+///
+/// let boxes = [0.0, 1.0, 5.0].map(|x| BoundingBox { min: [x, 0.0, 0.0], max: [x + 2.0, 1.0, 1.0] });
+/// let tree = Bvh::new(boxes);
+/// let (mut pairs, mut right) = (vec![], vec![]);
+/// tree.pairs(|i, j| pairs.push((i, j)));
+/// assert_eq!(pairs, [(0, 1)]);
+/// tree.overlapping(&BoundingBox { min: [6.0, 0.0, 0.0], max: [9.0, 1.0, 1.0] }, |i| right.push(i));
+/// assert_eq!(right, [2]);
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Bvh {
     nodes: Vec<Node>,
@@ -62,6 +75,7 @@ impl Bvh {
         let at = self.nodes.len();
         let items = &self.items[first..end];
         let around = items[0].around;
+        // Before its parts, so that the first of these is the next node. The box is not known yet.
         self.nodes.push(Node { around, first: first as u32, end: end as u32, second: 0 });
         let (around, second) = if items.len() > LEAF {
             let middle = first + parting(&cells[first..end], depth);
@@ -100,7 +114,7 @@ impl Bvh {
     }
 
     /// The item with the least squared distance to `x`, if one is nearer than the root of `bound`; `distance` tells that of
-    /// an item. Of equal ones, the first that is met.
+    /// an item, which must be no less than that to its box. Of equal ones, the first that is met.
     pub fn nearest(&self, x: Vec3, bound: f64, mut distance: impl FnMut(u32) -> f64) -> Option<(u32, f64)> {
         let mut best: Option<(u32, f64)> = None;
         let mut least = bound;
@@ -212,6 +226,7 @@ fn parting(cells: &[(u64, u32)], depth: usize) -> usize {
     if first == last || depth >= BY_CELLS {
         return cells.len() / 2;
     }
+    // The highest bit in which the first and the last cell differ parts the smallest cell around both.
     let highest = 1_u64 << (first ^ last).ilog2();
     cells.partition_point(|(cell, _)| cell & highest == 0)
 }

@@ -15,6 +15,16 @@ pub struct OnTriangle {
 ///
 /// Inside, weights are ratios of the areas that the foot of the perpendicular spans with the sides (Ericson 2005,
 /// *Real-time collision detection*, 3.4); where one is negative, or there is no area, the sides decide.
+///
+/// ```
+/// use planish_core::evaluate::on_triangle;
+///
+/// let triangle = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+/// let above = on_triangle([1.0, 1.0, 3.0], triangle);
+/// assert_eq!((above.weights, above.squared), ([0.5, 0.25, 0.25], 9.0));
+/// let beside = on_triangle([1.0, -2.0, 0.0], triangle);
+/// assert_eq!((beside.weights, beside.squared), ([0.75, 0.25, 0.0], 4.0));
+/// ```
 pub fn on_triangle(x: Vec3, p: [Vec3; 3]) -> OnTriangle {
     let normal = cross(sub(p[1], p[0]), sub(p[2], p[0]));
     let squared_normal = dot(normal, normal);

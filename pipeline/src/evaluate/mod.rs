@@ -22,6 +22,22 @@ use crate::vec3::{BoundingBox, Vec3};
 use std::sync::OnceLock;
 
 /// A triangulation in space and in the plane, searched by either.
+///
+/// ```
+/// use planish_core::evaluate::LinearMap;
+///
+/// // A square that rises towards its upper side, and its map: the view from above.
+/// let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]];
+/// let uv = points.iter().map(|[x, y, _]| [*x, *y]).collect();
+/// let map = LinearMap::new(points, uv, vec![[0, 1, 2], [0, 2, 3]]);
+/// let there = map.to_space([0.5, 0.25]).expect("it has triangles");
+/// assert_eq!((there.triangle, map.point_of(&there)), (0, [0.5, 0.25, 0.25]));
+/// let back = map.to_plane([0.5, 0.25, 0.25]).expect("it has triangles");
+/// assert_eq!((map.uv_of(&back), back.distance), ([0.5, 0.25], 0.0));
+/// // Outside there is an answer, too, and it tells how far off it is.
+/// let outside = map.to_space([3.0, 0.5]).expect("it has triangles");
+/// assert_eq!((map.uv_of(&outside), outside.distance), ([1.0, 0.5], 2.0));
+/// ```
 #[derive(Clone, Debug)]
 pub struct LinearMap {
     points: Vec<Vec3>,
@@ -44,22 +60,22 @@ pub struct Located {
 }
 
 impl LinearMap {
-    /// A map of `triangles` over nodes with places in space and in the plane, as many of each.
+    /// A map of `triangles` over nodes whose positions in space are `points`, and in the plane `uv`.
     ///
     /// # Panics
-    /// Where a triangle names a node that does not exist.
+    /// Where there are not as many `uv` as `points`, or a triangle names a node that does not exist.
     pub fn new(points: Vec<Vec3>, uv: Vec<[f64; 2]>, triangles: Vec<[u32; 3]>) -> Self {
         assert_eq!(points.len(), uv.len(), "every node has both places");
         let in_space = triangle_bvh(triangles.iter().map(|t| t.map(|n| points[n as usize])));
         Self { points, uv, triangles, in_space, in_plane: OnceLock::new() }
     }
 
-    /// The places of the nodes in space.
+    /// The positions of the nodes in space.
     pub fn points(&self) -> &[Vec3] {
         &self.points
     }
 
-    /// The places of the nodes in the plane.
+    /// The positions of the nodes in the plane.
     pub fn uv(&self) -> &[[f64; 2]] {
         &self.uv
     }
@@ -118,6 +134,17 @@ pub(crate) fn box_around([a, b, c]: [Vec3; 3]) -> BoundingBox {
 }
 
 /// The point closest to `x` of triangles in a hierarchy, if it is nearer than `bound`; `corners` tells those of a triangle.
+///
+/// ```
+/// use planish_core::evaluate::{nearest, triangle_bvh};
+///
+/// let triangles = [0.0, 5.0].map(|z| [[0.0, 0.0, z], [4.0, 0.0, z], [0.0, 4.0, z]]);
+/// let tree = triangle_bvh(triangles);
+/// let closest = |x, bound| nearest(&tree, x, bound, |t| triangles[t as usize]);
+/// let found = closest([1.0, 1.0, 4.0], f64::INFINITY).expect("there are some");
+/// assert_eq!((found.triangle, found.distance, found.weights), (1, 1.0, [0.5, 0.25, 0.25]));
+/// assert_eq!(closest([1.0, 1.0, 2.0], 0.5), None, "none is so near");
+/// ```
 pub fn nearest(tree: &Bvh, x: Vec3, bound: f64, corners: impl Fn(u32) -> [Vec3; 3]) -> Option<Located> {
     let (triangle, _) = tree.nearest(x, bound * bound, |f| on_triangle(x, corners(f)).squared)?;
     let OnTriangle { weights, squared } = on_triangle(x, corners(triangle));

@@ -7,6 +7,20 @@ use crate::vec3::{Vec3, cross, dot, norm, sub, unit_scale};
 const FLAT: f64 = 1e-9;
 
 /// A plane with two directions at right angles in it.
+///
+/// ```
+/// use planish_core::evaluate::Plane;
+/// use planish_core::shapes;
+///
+/// let flat = shapes::flat_disk(6);
+/// let plane = Plane::of(flat.points(), flat.triangles()).expect("all its nodes lie in one plane");
+/// assert_eq!(plane.normal(), [0.0, 0.0, 1.0]);
+/// // Distances are those of space; the height above the plane does not count.
+/// let [u, v] = plane.place([3.0, 4.0, 7.0]);
+/// assert!((u.hypot(v) - 5.0).abs() < 1e-12);
+/// let bent = shapes::disk(6);
+/// assert_eq!(Plane::of(bent.points(), bent.triangles()), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     origin: Vec3,
@@ -67,6 +81,7 @@ impl Plane {
 
 /// Two directions at right angles to a unit normal and each other, which turn left around it.
 fn axes(normal: Vec3) -> [Vec3; 2] {
+    // The axis that is closest to the plane: the vector product with it cannot vanish.
     let least = (1..3).fold(0, |best, k| if normal[k].abs() < normal[best].abs() { k } else { best });
     let mut direction = [0.0; 3];
     direction[least] = 1.0;

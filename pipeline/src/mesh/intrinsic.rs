@@ -13,6 +13,17 @@ const SLACK: f64 = 1e-8;
 const FLAG: f64 = 0.01;
 
 /// A triangle by its edge lengths: edge 0 joins corners 0 and 1, edge 1 corners 1 and 2, edge 2 corners 2 and 0.
+///
+/// ```
+/// use planish_core::mesh::TriangleShape;
+///
+/// let shape = TriangleShape::of([[0.0; 3], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]]);
+/// assert_eq!((shape.lengths, shape.area()), ([3.0, 5.0, 4.0], 6.0));
+/// assert_eq!(shape.slack(), 2.0, "3 + 4 is more than 5 by so much");
+/// // No triangle has these lengths: it counts as one without an area.
+/// let broken = TriangleShape { lengths: [1.0, 1.0, 3.0] };
+/// assert_eq!((broken.slack(), broken.area()), (-1.0, 0.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleShape {
     /// Lengths of the edges 01, 12, 20.
@@ -72,6 +83,18 @@ fn sorted(mut lengths: [f64; 3]) -> [f64; 3] {
 }
 
 /// The intrinsic metric of a surface: one shape per triangle, every area positive.
+///
+/// ```
+/// use planish_core::mesh::Metric;
+///
+/// let sound = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// let flat = [[0.0; 3], [1.0, 0.0, 0.0], [0.5, 0.0, 0.0]];
+/// let metric = Metric::new(&[sound, flat], 1.0);
+/// // All six lengths grew by the same small number: the flat triangle has an area, the sound one keeps its own.
+/// assert!(metric.mollified_by > 0.0 && metric.mollified_by < 1e-7);
+/// assert!(metric.area(1) > 0.0 && (metric.area(0) - 0.5).abs() < 1e-7);
+/// assert_eq!(metric.flagged, [false, true], "what depends on the second area is left out of statistics");
+/// ```
 #[derive(Clone, Debug)]
 pub struct Metric {
     /// Mollified shapes, one per triangle, in the unit of `scale`.
@@ -91,12 +114,16 @@ impl Metric {
         let mut shapes: Vec<_> = scaled.iter().map(|t| TriangleShape::of(*t)).collect();
         let total: f64 = shapes.iter().flat_map(|s| s.lengths).sum();
         let margin = SLACK * total / (3 * shapes.len().max(1)) as f64;
+        // The smallest number that gives the worst triangle its margin: it grows the sum of two sides twice, the third one once.
         let added = shapes.iter().map(|s| margin - s.slack()).fold(0.0, f64::max);
         if added > 0.0 {
             shapes.iter_mut().for_each(|s| s.lengths = s.lengths.map(|l| l + added));
         }
-        let differs = |(s, t): (&TriangleShape, &[Vec3; 3])| (s.area() - triangle_area(*t)).abs() > FLAG * s.area();
-        let flagged = shapes.iter().zip(&scaled).map(differs).collect();
+        let mut flagged = Vec::with_capacity(shapes.len());
+        for (shape, corners) in shapes.iter().zip(&scaled) {
+            let change = (shape.area() - triangle_area(*corners)).abs();
+            flagged.push(change > FLAG * shape.area());
+        }
         Self { shapes, mollified_by: added, flagged, scale }
     }
 

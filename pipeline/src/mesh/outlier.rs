@@ -28,6 +28,19 @@ pub struct ValueApart {
 
 impl SurfaceMesh {
     /// The value that is apart from all others along an axis over which the surface has heights, if there is one.
+    ///
+    /// ```
+    /// use planish_core::{mesh::TriangleSoup, repair, shapes};
+    ///
+    /// let terrain = shapes::disk(9);
+    /// let mut points = terrain.points().to_vec();
+    /// points[..3].iter_mut().for_each(|p| p[2] = -9999.0);
+    /// let soup = TriangleSoup::new(points, terrain.triangles().to_vec())?;
+    /// let mesh = repair(&soup, &repair::Settings::default())?.mesh;
+    /// let no_data = mesh.value_apart().expect("nothing else is near -9999");
+    /// assert_eq!((no_data.axis, no_data.value, no_data.vertices), (2, -9999.0, 3));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn value_apart(&self) -> Option<ValueApart> {
         (0..3).find_map(|axis| value_apart(self.points(), axis).filter(|_| has_heights(self.points(), axis)))
     }
@@ -37,6 +50,7 @@ fn value_apart(points: &[Vec3], axis: usize) -> Option<ValueApart> {
     let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
     values.sort_unstable_by(f64::total_cmp);
     let (least, largest) = (*values.first()?, *values.last()?);
+    // Sorted, all that have the least value come first, and all that have the largest one come last.
     let below = values.partition_point(|v| *v <= least);
     let above = values.partition_point(|v| *v < largest);
     let apart = |value: f64, vertices: usize, others: &[f64]| {

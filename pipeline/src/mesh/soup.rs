@@ -82,6 +82,20 @@ impl TriangleSoup {
     ///
     /// # Errors
     /// The first defect found, see [`SoupError`].
+    ///
+    /// ```
+    /// use planish_core::mesh::{SoupError, TriangleSoup};
+    ///
+    /// let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [f64::NAN; 3]];
+    /// let soup = TriangleSoup::new(points.clone(), vec![[0, 1, 2]])?;
+    /// assert_eq!(soup.points().len(), 4, "what no triangle uses keeps its number");
+    ///
+    /// let missing = TriangleSoup::new(points.clone(), vec![[0, 1, 4]]);
+    /// assert_eq!(missing, Err(SoupError::IndexOutOfRange { triangle: 0, index: 4, points: 4 }));
+    /// let refused = TriangleSoup::new(points, vec![[0, 1, 2], [0, 1, 3]]);
+    /// assert!(matches!(refused, Err(SoupError::NotFinite { point: 3, axis: 'x', triangle: 1, .. })));
+    /// # Ok::<(), SoupError>(())
+    /// ```
     pub fn new(mut points: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self, SoupError> {
         let (count, limit) = (points.len(), Self::MAX_TRIANGLES);
         if triangles.len() > limit || count > 3 * limit {

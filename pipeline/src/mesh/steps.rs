@@ -40,6 +40,18 @@ impl CoordinateSteps {
 
 impl SurfaceMesh {
     /// The steps in which the coordinates lie, where these are so coarse that the directions of many edges are unknown.
+    ///
+    /// ```
+    /// use planish_core::{mesh::TriangleSoup, repair, shapes};
+    ///
+    /// // Triangles about 1 m wide, in metres of a map, as STL holds them.
+    /// let disk = shapes::disk(20);
+    /// let on_map = |[x, y, z]: &[f64; 3]| [20.0 * x + 4e5, 20.0 * y + 5e6, 20.0 * z].map(|c| f64::from(c as f32));
+    /// let soup = TriangleSoup::new(disk.points().iter().map(on_map).collect(), disk.triangles().to_vec())?;
+    /// let coarse = repair(&soup, &repair::Settings::default())?.mesh.coarse_steps().expect("many edges are short");
+    /// assert_eq!((coarse.largest(), coarse.axis()), (0.5, 1), "at 5,000,000 no number lies between 0 and 0.5");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn coarse_steps(&self) -> Option<CoordinateSteps> {
         let step = steps(self.points())?;
         let few = FEW_STEPS * step.into_iter().fold(0.0, f64::max);
@@ -73,6 +85,7 @@ fn step(points: &[Vec3], axis: usize) -> f64 {
     }
     let median = *sizes.select_nth_unstable_by(middle, f32::total_cmp).1;
     let step = f64::from(median.next_up()) - f64::from(median);
+    // Odd multiples of the step, or finer numbers: even multiples of it would fit wider steps, too.
     let is_rounded = step.is_finite() && points.iter().any(|p| p[axis] % (2.0 * step) != 0.0);
     if is_rounded { step } else { 0.0 }
 }

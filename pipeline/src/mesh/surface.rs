@@ -11,6 +11,20 @@ const EDGES_PER_DIAGONAL: f64 = 50.0;
 /// A triangulated surface after repair: no triangle repeats a vertex or another triangle, orientable components
 /// are oriented, and every sheet that met others at non-manifold edges or vertices has vertices of its own. Made by
 /// [`crate::repair()`].
+///
+/// ```
+/// use planish_core::topology::VertexId;
+/// use planish_core::{repair, shapes};
+///
+/// let soup = shapes::book(3, 4);
+/// let mesh = repair(&soup, &repair::Settings::default())?.mesh;
+/// // Each of the three pages has a spine of its own, 5 vertices long. That they were one is still told.
+/// assert_eq!(mesh.points().len(), soup.points().len() + 2 * 5);
+/// assert_eq!(mesh.welded_vertex(VertexId(0)), mesh.welded_vertex(VertexId(1)));
+/// let summary = mesh.topology_summary();
+/// assert_eq!((summary.components, summary.nonmanifold_edges), (3, 4));
+/// # Ok::<(), repair::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct SurfaceMesh {
     pub(super) points: Vec<Vec3>,

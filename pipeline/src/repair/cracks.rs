@@ -55,19 +55,27 @@ pub(super) fn find(points: &[Vec3], triangles: &[[VertexId; 3]], edges: &EdgeTab
 /// Joins bundle by bundle; how many edges were joined to another one.
 fn join_bundles(rim: &Rim, candidates: &[Candidate], joiner: &mut Joiner) -> usize {
     let mut bundles = UnionFind::new(rim.open.len());
-    candidates.iter().for_each(|c| {
+    for c in candidates {
         bundles.merge(c.edges[0], c.edges[1]);
-    });
+    }
+    // Per bundle (at its representative), whether two of its triangles face each other.
     let mut has_facing = vec![false; rim.open.len()];
-    candidates.iter().filter(|c| c.facing).for_each(|c| has_facing[bundles.find(c.edges[0])] = true);
+    for c in candidates.iter().filter(|c| c.facing) {
+        has_facing[bundles.find(c.edges[0])] = true;
+    }
+    // Candidates come in the order of their gaps: in a bundle with facing triangles an edge takes the nearest partner, and
+    // that one only.
     let mut joined = UnionFind::new(rim.open.len());
     let mut taken = vec![false; rim.open.len()];
     let mut pairs = 0;
     for c in candidates.iter().filter(|c| !c.facing) {
         let [g, h] = c.edges;
         let single = has_facing[bundles.find(g)];
-        let free = !(single && (taken[g] || taken[h])) && joined.find(g) != joined.find(h);
-        if free && joiner.join(c.ends) {
+        if single && (taken[g] || taken[h]) {
+            continue;
+        }
+        let are_apart = joined.find(g) != joined.find(h);
+        if are_apart && joiner.join(c.ends) {
             joined.merge(g, h);
             (taken[g], taken[h]) = (true, true);
             pairs += 1;
@@ -82,12 +90,16 @@ fn zip_short_edges(rim: &Rim, joiner: &mut Joiner) -> usize {
     let short: Vec<[VertexId; 2]> = rim.open.iter().filter(|h| !rim.is_long(**h)).map(|h| rim.ends(*h)).collect();
     let mut pairs = 0;
     loop {
-        let arm = |joiner: &mut Joiner, a: VertexId, b: VertexId| (joiner.sets.find(a.index()), a, b);
-        let mut arms: Vec<_> = short.iter().flat_map(|[a, b]| [arm(joiner, *a, *b), arm(joiner, *b, *a)]).collect();
+        let mut arms = Vec::with_capacity(2 * short.len());
+        for [a, b] in short.iter().copied() {
+            arms.push(Arm { joined: joiner.sets.find(a.index()), vertex: a, far: b });
+            arms.push(Arm { joined: joiner.sets.find(b.index()), vertex: b, far: a });
+        }
+        // Arms at one joined vertex come to stand side by side.
         arms.sort_unstable();
         let before = pairs;
-        for pair in arms.windows(2).filter(|w| w[0].0 == w[1].0 && rim.run_alike(w)) {
-            let (a, b) = (pair[0].2, pair[1].2);
+        for pair in arms.windows(2).filter(|w| w[0].joined == w[1].joined && rim.run_alike(w)) {
+            let (a, b) = (pair[0].far, pair[1].far);
             let apart = joiner.sets.find(a.index()) != joiner.sets.find(b.index());
             if apart && rim.gap(a, b) <= rim.tolerance && joiner.join([[a, b], [a, b]]) {
                 pairs += 1;
@@ -97,6 +109,17 @@ fn zip_short_edges(rim: &Rim, joiner: &mut Joiner) -> usize {
             return pairs;
         }
     }
+}
+
+/// A short open edge, seen from one of its ends.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Arm {
+    /// The vertex that stands for all that this end is joined with so far.
+    joined: usize,
+    /// This end.
+    vertex: VertexId,
+    /// The other end.
+    far: VertexId,
 }
 
 /// The open edges of a builder.
@@ -121,10 +144,9 @@ impl Rim<'_> {
         distance(self.position(a), self.position(b))
     }
 
-    /// Whether two arms (joined vertex, own vertex, far end) leave the joined vertex in the same direction, rather
-    /// than being neighbours along one rim.
-    fn run_alike(&self, arms: &[(usize, VertexId, VertexId)]) -> bool {
-        let [u, v] = [0, 1].map(|k| sub(self.position(arms[k].2), self.position(arms[k].1)));
+    /// Whether two arms leave the joined vertex in the same direction, rather than being neighbours along one rim.
+    fn run_alike(&self, arms: &[Arm]) -> bool {
+        let [u, v] = [0, 1].map(|k| sub(self.position(arms[k].far), self.position(arms[k].vertex)));
         dot(u, v) > 0.0
     }
 
@@ -140,6 +162,7 @@ impl Rim<'_> {
         cells.sort_unstable();
         let mut found = Vec::new();
         for &([x, y, z], g) in &cells {
+            // The 27 cells around: sorted by x, y, z, the three above each other in z are one run.
             for (i, j) in (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j))) {
                 let (low, high) = ([x + i, y + j, z - 1], [x + i, y + j, z + 1]);
                 let start = cells.partition_point(|(cell, _)| *cell < low);
@@ -160,8 +183,9 @@ impl Rim<'_> {
     fn candidate(&self, g: usize, h: usize) -> Option<Candidate> {
         let edges = [self.open[g], self.open[h]];
         let [[a, b], [c, d]] = edges.map(|e| self.ends(e));
+        // Against each other, as the sides of one edge of an oriented surface run, or alongside.
         let ways = [[[a, d], [b, c]], [[a, c], [b, d]]];
-        let widths = ways.map(|w| self.gap(w[0][0], w[0][1]).max(self.gap(w[1][0], w[1][1])));
+        let widths = ways.map(|[[p, q], [r, s]]| self.gap(p, q).max(self.gap(r, s)));
         let best = usize::from(widths[1] < widths[0]);
         let fits = widths[best] <= self.tolerance && edges[0].face() != edges[1].face();
         let facing = fits && self.facing(edges[0], edges[1]);
@@ -216,6 +240,7 @@ impl<'a> Joiner<'a> {
     fn may_unite(&mut self, a: usize, b: usize) -> bool {
         let (a, b) = (self.sets.find(a), self.sets.find(b));
         let (few, other) = if self.faces[a].len() <= self.faces[b].len() { (a, b) } else { (b, a) };
+        // Taken out while the sets are asked, which are told anew of what they find; put back below.
         let faces = std::mem::take(&mut self.faces[few]);
         let clash =
             faces.iter().any(|f| self.triangles[*f as usize].iter().any(|v| self.sets.find(v.index()) == other));

@@ -70,6 +70,19 @@ impl Sample {
 }
 
 /// What repair found and did.
+///
+/// ```
+/// use planish_core::{mesh::TriangleSoup, repair};
+///
+/// let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+/// // The second triangle is turned over, the third a copy of the first, and the last one has two equal corners.
+/// let soup = TriangleSoup::new(points, vec![[0, 1, 2], [0, 3, 2], [1, 2, 0], [3, 3, 0]])?;
+/// let report = repair(&soup, &repair::Settings::default())?.report;
+/// assert_eq!(report.flipped_triangles.first, [1]);
+/// assert_eq!(report.duplicate_triangles.first, [2]);
+/// assert_eq!(report.degenerate_triangles.first, [3]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// Points merged into a bit-equal one.
@@ -173,6 +186,21 @@ struct Measure {
 ///
 /// # Errors
 /// [`Error::OnlyDegenerate`] when nothing is left.
+///
+/// ```
+/// use planish_core::repair::{Settings, repair};
+/// use planish_core::shapes;
+///
+/// // A plate cut along its middle, as exporters leave it: the two sides of the cut differ in their last digits.
+/// let soup = shapes::cracked_patch();
+/// let repaired = repair(&soup, &Settings::default())?;
+/// assert_eq!((repaired.raw.components, repaired.mesh.topology_summary().components), (2, 1));
+/// assert_eq!(repaired.report.cracks_closed, 8);
+/// // Without a tolerance nothing is joined.
+/// let apart = repair(&soup, &Settings { weld: 0.0 })?;
+/// assert_eq!(apart.mesh.topology_summary().components, 2);
+/// # Ok::<(), planish_core::repair::Error>(())
+/// ```
 pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Error> {
     let (mut builder, welded) = weld::weld(soup);
     let mut report = Report { welded, ..Report::default() };
@@ -196,6 +224,7 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     edges = renewed(edges, changed, &builder.triangles);
     report.t_junctions_left = builder.t_junctions_left(&edges, &measure);
     drop(measure);
+    // A surface that was counted without inconsistent edges, and has not changed, is oriented as it is.
     let as_counted = report.duplicate_triangles.count == 0 && report.cracks_closed == 0 && !split;
     if !as_counted || raw.inconsistent_edges > 0 {
         report.flipped_triangles = builder.orient(&edges);
@@ -206,6 +235,7 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     let opened = report.slits_opened > 0;
     edges = renewed(edges, opened, &builder.triangles);
     report.triangles_added = if split || opened { builder.count_added() } else { 0 };
+    // Where the triangles are those that were counted, their counts still hold.
     let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0 && !opened);
     let mesh = builder.into_mesh(edges, input_points, known, &mut report);
     // As read: vertices of degenerate triangles count, though these do not.
@@ -295,18 +325,9 @@ impl MeshBuilder {
             return 0;
         }
         let fans = VertexFans::new(&self.triangles, edges);
-        let ends = |h: &HalfEdgeId| {
-            let [a, b] = [h.index(), h.next().index()].map(|corner| fans.of_corner[corner]);
-            [a.min(b), a.max(b)]
-        };
-        let rejoined = |sides: &[HalfEdgeId]| {
-            let mut all: Vec<[u32; 2]> = sides.iter().map(ends).collect();
-            all.sort_unstable();
-            all.windows(2).any(|w| w[0] == w[1])
-        };
         let mut cut: Vec<(HalfEdgeId, VertexId)> = Vec::new();
         let mut opened = 0;
-        for (_, sides) in edges.iter().filter(|(_, sides)| meets(sides) && rejoined(sides)) {
+        for (_, sides) in edges.iter().filter(|(_, sides)| meets(sides) && are_rejoined(sides, &fans)) {
             let t = self.triangles[sides[0].face().index()];
             let [a, b] = [t[sides[0].side()], t[(sides[0].side() + 1) % 3]];
             let middle = VertexId::at(self.points.len());
@@ -363,11 +384,12 @@ impl MeshBuilder {
         for (c, flip) in found.component.iter().zip(&found.flip) {
             balance[*c as usize] += if *flip { -1 } else { 1 };
         }
-        let turn = |(flip, c): (&bool, &u32)| found.orientable[*c as usize] && *flip != (balance[*c as usize] < 0);
-        let turned = found.flip.iter().zip(&found.component).map(turn);
         let mut flipped = Sample::default();
-        for (face, turn) in turned.enumerate() {
-            if turn {
+        for (face, component) in found.component.iter().enumerate() {
+            let component = *component as usize;
+            // `flip` is relative to the first triangle: where most would have to be flipped, the others are.
+            let is_minority = found.flip[face] != (balance[component] < 0);
+            if found.orientable[component] && is_minority {
                 self.triangles[face].swap(1, 2);
                 flipped.push(self.source[face]);
             }
@@ -406,6 +428,18 @@ impl MeshBuilder {
     }
 }
 
+/// Whether two of these half-edges run between the same two fans: they are one edge again when every fan has a vertex of
+/// its own.
+fn are_rejoined(sides: &[HalfEdgeId], fans: &VertexFans) -> bool {
+    let mut ends = Vec::with_capacity(sides.len());
+    for h in sides {
+        let [a, b] = [h.index(), h.next().index()].map(|corner| fans.of_corner[corner]);
+        ends.push([a.min(b), a.max(b)]);
+    }
+    ends.sort_unstable();
+    ends.windows(2).any(|pair| pair[0] == pair[1])
+}
+
 /// One vertex per fan, in ascending order of the vertices they come from: per fan its vertex, and per
 /// vertex the welded point it is a copy of.
 fn split_vertices(fan_vertices: &[VertexId], report: &mut Report) -> (Vec<VertexId>, Vec<u32>) {
@@ -429,9 +463,14 @@ fn pinned_vertices(welded: &[u32], triangles: &[[VertexId; 3]], edges: &EdgeTabl
         on_boundary[triangles[h.face().index()][h.side()].index()] = true;
         on_boundary[triangles[h.face().index()][h.next().side()].index()] = true;
     }
-    let copies = welded.iter().zip(&on_boundary).collect::<Vec<_>>();
-    let pinned = |sheets: &&[(&u32, &bool)]| sheets.len() > 1 && sheets.iter().any(|s| !s.1);
-    copies.chunk_by(|a, b| a.0 == b.0).filter(pinned).count()
+    let vertices: Vec<(u32, bool)> = welded.iter().copied().zip(on_boundary).collect();
+    let mut pinned = 0;
+    // Copies of a vertex follow each other.
+    for copies in vertices.chunk_by(|a, b| a.0 == b.0) {
+        let touches_inside = copies.iter().any(|(_, on_boundary)| !on_boundary);
+        pinned += usize::from(copies.len() > 1 && touches_inside);
+    }
+    pinned
 }
 
 /// The half-edges along open edges, ascending.

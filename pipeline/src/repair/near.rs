@@ -17,6 +17,7 @@ impl PointTree {
     /// The tree of the points with these ids. Every node halves its points, so that it is log2 of their number deep.
     pub(super) fn new(points: &[Vec3], mut ids: Vec<u32>) -> Self {
         let depth = (ids.len() / LEAF + 1).next_power_of_two().ilog2();
+        // A complete binary tree, with 2^(depth + 1) - 1 nodes.
         let mut boxes = vec![None; (2 << depth) - 1];
         build(points, &mut ids, &mut boxes, 0);
         Self { ids, boxes }
@@ -64,6 +65,7 @@ fn build(points: &[Vec3], ids: &mut [u32], boxes: &mut [Option<BoundingBox>], no
 /// Whether the segment passes the box widened by `reach` on all sides (the slabs of Kay and Kajiya 1986, doi
 /// 10.1145/15886.15916).
 fn passes(cell: &BoundingBox, a: Vec3, b: Vec3, reach: f64) -> bool {
+    // The part of the segment, as shares of it, that lies between the planes of all axes so far.
     let (mut from, mut to) = (0.0_f64, 1.0_f64);
     for k in 0..3 {
         let (low, high, along) = (cell.min[k] - reach, cell.max[k] + reach, b[k] - a[k]);

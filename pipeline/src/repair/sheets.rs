@@ -61,6 +61,17 @@ impl Repaired {
     ///
     /// # Errors
     /// [`Error::VolumeElements`], where no other is left.
+    ///
+    /// ```
+    /// use planish_core::{repair, repair::Error, shapes};
+    ///
+    /// let repaired = |pages| repair(&shapes::book(pages, 1), &repair::Settings::default());
+    /// assert!(repaired(3)?.accepted()?.refused.is_empty(), "three sheets that meet in an edge are three charts");
+    /// // As many sheets of two triangles as the faces of volume elements have.
+    /// let refused = repaired(1100)?.accepted().expect_err("nobody wants so many charts");
+    /// assert!(matches!(refused, Error::VolumeElements { sheets: 1099, triangles: 2200, .. }));
+    /// # Ok::<(), Error>(())
+    /// ```
     pub fn accepted(self) -> Result<Accepted, Error> {
         let Selection { kept, nonmanifold_edges, refused } = self.selection()?;
         let Some(kept) = kept else { return Ok(Accepted { mesh: self.mesh, refused }) };

@@ -236,8 +236,10 @@ impl<'a> Boundary<'a> {
 
     /// Whether edges along the edge `h` face it or each other, or are too many to tell.
     fn is_crowded(&self, h: HalfEdgeId, line: &Line, mut beside: Vec<Beside>) -> bool {
+        // The edge itself runs along all of it.
         beside.push(Beside { span: [0.0, line.length], inward: self.inward(h) });
         beside.sort_by(|a, b| a.span[0].total_cmp(&b.span[0]));
+        // A sweep along the edge: these have begun, and end farther on.
         let mut here: Vec<&Beside> = Vec::new();
         for b in &beside {
             here.retain(|a| a.span[1] - b.span[0] > self.tolerance);
@@ -260,6 +262,7 @@ impl<'a> Boundary<'a> {
         let [a, b] = self.ends(h).map(|v| self.point(v));
         let tip = self.point(self.triangles[h.face().index()][h.prev().side()]);
         let normal = cross(sub(b, a), sub(tip, a));
+        // The part over the piece from p to q turns the way of the whole triangle.
         let is_sound = |p: Vec3, q: Vec3| dot(cross(sub(q, p), sub(tip, p)), normal) > 0.0;
         let (mut last, mut reached, mut kept) = (a, 0.0, Vec::new());
         for v in on_edge {

@@ -49,6 +49,7 @@ fn first_by_table(points: &[Vec3]) -> Option<Vec<u32>> {
     let mut first = Vec::with_capacity(points.len());
     for (i, point) in points.iter().enumerate() {
         let point = bits_of(*point);
+        // The high bits, as multiplication carries upwards: they depend on all of those below.
         let mut place = (scattered(point) >> (u64::BITS - places.ilog2())) as usize;
         loop {
             let found = &mut table[place];

@@ -28,18 +28,35 @@ impl SeamNetwork {
     fn comparable_pairs(&self) -> Vec<(usize, usize)> {
         let mut pairs = Vec::new();
         for chart in (0..self.loops.len()).map(ChartId::at) {
-            let mut seams: Vec<usize> = self.loops(chart).iter().flatten().map(|p| p.curve.index()).collect();
-            seams.retain(|c| !self.curves[*c].is_open());
-            seams.sort_unstable();
-            seams.dedup();
-            let apart = |i: usize, j: usize| !self.curves[i].ends.iter().any(|e| self.curves[j].ends.contains(e));
+            let seams = self.seams_beside(chart);
             for (k, i) in seams.iter().enumerate() {
-                pairs.extend(seams[k + 1..].iter().filter(|j| apart(*i, **j)).map(|j| (*i, *j)));
+                for j in &seams[k + 1..] {
+                    if !self.share_an_end(*i, *j) {
+                        pairs.push((*i, *j));
+                    }
+                }
             }
         }
+        // Two charts may lie beside the same two seams.
         pairs.sort_unstable();
         pairs.dedup();
         pairs
+    }
+
+    /// The seams that a chart's loops pass, by their positions among the curves, ascending.
+    fn seams_beside(&self, chart: ChartId) -> Vec<usize> {
+        let passages = self.loops(chart).iter().flatten();
+        let mut seams: Vec<usize> = passages.map(|passage| passage.curve.index()).collect();
+        seams.retain(|c| !self.curves[*c].is_open());
+        seams.sort_unstable();
+        seams.dedup();
+        seams
+    }
+
+    /// Whether two curves begin or end in the same point.
+    fn share_an_end(&self, i: usize, j: usize) -> bool {
+        let ends = self.curves[j].ends;
+        self.curves[i].ends.iter().any(|end| ends.contains(end))
     }
 }
 
@@ -73,6 +90,7 @@ impl Polyline {
     fn new(points: Vec<Vec3>) -> Self {
         let whole = Range { first: 0, end: points.len() - 1, at: 0 };
         let empty = BoundingBox { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+        // Halves of n segments are numbered below 4 n.
         let mut line = Self { boxes: vec![empty; 4 * whole.len()], points };
         line.fill(whole);
         line
@@ -126,10 +144,15 @@ fn gap(a: &BoundingBox, b: &BoundingBox) -> f64 {
 
 /// The squared distance of two segments (Ericson 2005, *Real-time collision detection*, section 5.1.9).
 pub(crate) fn segment_distance(p: [Vec3; 2], q: [Vec3; 2]) -> f64 {
-    let (d, e, r) = (sub(p[1], p[0]), sub(q[1], q[0]), sub(p[0], q[0]));
+    // The points p0 + s d and q0 + t e, with s and t in [0, 1], are r + s d - t e apart.
+    let d = sub(p[1], p[0]);
+    let e = sub(q[1], q[0]);
+    let r = sub(p[0], q[0]);
     let (dd, ee, de) = (dot(d, d), dot(e, e), dot(d, e));
     let (dr, er) = (dot(d, r), dot(e, r));
+    // Of segments that are parallel, or points, b is 0: then any place will do to begin with.
     let ratio = |a: f64, b: f64| if b > 0.0 { (a / b).clamp(0.0, 1.0) } else { 0.0 };
+    // Closest to the other line, then t for that s, then s for that t, as t may have been held at an end.
     let s = ratio(de * er - dr * ee, dd * ee - de * de);
     let t = ratio(de * s + er, ee);
     let s = ratio(de * t - dr, dd);

@@ -6,7 +6,7 @@
 
 use super::Defect;
 use super::open::sides_of_one;
-use super::reference::{HandedOverAtlas, Mesh};
+use super::reference::{HandedOverAtlas, HandedOverChart, Mesh};
 use crate::evaluate::{Bvh, OnSegment, on_segment};
 use crate::topology::{ChartId, CurveId, VertexId};
 use crate::vec3::{BoundingBox, Vec3, distance};
@@ -46,29 +46,54 @@ pub struct Boundaries {
 /// Looks at the boundaries of all charts. `triangles` are those of the mesh in each chart; nodes lie on a curve that is
 /// nearer than `tolerance`.
 pub fn boundaries(mesh: &Mesh, triangles: &[Vec<u32>], atlas: &HandedOverAtlas, tolerance: f64) -> Boundaries {
-    let mut found = Boundaries::default();
-    let sides = CurveSides::new(&atlas.curves);
-    let places_on = |v: VertexId| sides.at(mesh.triangulation.points[v.index()], tolerance);
-    let mut known: BTreeMap<VertexId, Vec<OnCurve>> = BTreeMap::new();
-    found.open = open_edges(mesh, triangles);
-    for v in found.open.iter().flatten().flatten() {
-        known.entry(*v).or_insert_with(|| places_on(*v));
+    let open = open_edges(mesh, triangles);
+    let known = known_places(mesh, &open, &CurveSides::new(&atlas.curves), tolerance);
+    let along = nodes_along(atlas, &open, &known);
+    let mut found = Boundaries { open, ..Boundaries::default() };
+    for (chart, open) in atlas.charts.iter().zip(&found.open) {
+        found.places.push(places_around(chart, open, &known));
     }
-    let along = nodes_along(atlas, &found.open, &known);
-    for (c, chart) in atlas.charts.iter().enumerate() {
-        let mine = |on: &&OnCurve| chart.curves.contains(&on.curve);
-        let nodes: BTreeSet<VertexId> = found.open[c].iter().flatten().copied().collect();
-        let places = nodes.into_iter().filter_map(|v| Some((v, *known[&v].iter().find(mine)?)));
-        found.places.push(places.collect());
+    let mut expected = Vec::with_capacity(atlas.curves.len());
+    for ((k, curve), nodes) in (0..).zip(&atlas.curves).zip(&along) {
+        expected.push(expected_on(mesh, k, curve, nodes, tolerance));
     }
-    let expected: Vec<Expected> =
-        (0..).zip(&atlas.curves).map(|(k, curve)| expected(mesh, k, curve, &along[k as usize], tolerance)).collect();
+    // Ends of curves first, each once, whatever the number of charts beside it.
     found.defects.extend(expected.iter().filter_map(|e| e.missing_end.clone()));
     for (c, chart) in atlas.charts.iter().enumerate() {
         let per_curve = chart.curves.iter().map(|k| (*k, &expected[*k as usize].edges[..]));
         found.defects.extend(compare(mesh, ChartId::at(c), &found.open[c], per_curve.collect()));
     }
     found
+}
+
+/// Per node of an open edge, its place on every curve that is near enough.
+fn known_places(
+    mesh: &Mesh,
+    open: &[Vec<[VertexId; 2]>],
+    curves: &CurveSides,
+    tolerance: f64,
+) -> BTreeMap<VertexId, Vec<OnCurve>> {
+    let mut known = BTreeMap::new();
+    for v in open.iter().flatten().flatten() {
+        known.entry(*v).or_insert_with(|| curves.at(mesh.triangulation.points[v.index()], tolerance));
+    }
+    known
+}
+
+/// Where the nodes of a chart's open edges lie on its own curves. In a point where curves meet, the first one counts.
+fn places_around(
+    chart: &HandedOverChart,
+    open: &[[VertexId; 2]],
+    known: &BTreeMap<VertexId, Vec<OnCurve>>,
+) -> BTreeMap<VertexId, OnCurve> {
+    let mut places = BTreeMap::new();
+    for v in open.iter().flatten() {
+        let mut on_own = known[v].iter().filter(|on| chart.curves.contains(&on.curve));
+        if let Some(on) = on_own.next() {
+            places.insert(*v, *on);
+        }
+    }
+    places
 }
 
 /// Per chart, the sides of triangles that no other triangle of the chart has, as the triangles run.
@@ -110,17 +135,20 @@ struct Expected {
     missing_end: Option<Defect>,
 }
 
-fn expected(mesh: &Mesh, k: u32, curve: &[Vec3], nodes: &[(OnCurve, VertexId)], tolerance: f64) -> Expected {
+/// The edges along curve `k`, of which these are the `nodes` in their order; and which of its ends is no node.
+fn expected_on(mesh: &Mesh, k: u32, curve: &[Vec3], nodes: &[(OnCurve, VertexId)], tolerance: f64) -> Expected {
     let points = &mesh.triangulation.points;
     let is_closed = curve.first() == curve.last();
-    let is_at = |end: Option<&Vec3>, node: Option<&(OnCurve, VertexId)>| {
-        end.zip(node).is_some_and(|(end, (_, v))| distance(*end, points[v.index()]) <= tolerance)
-    };
-    // A node at the begin of a closed curve may have been found at its end.
     let ends = [(curve.first(), nodes.first()), (curve.last(), nodes.last())];
-    let has = |(end, node)| is_at(end, node);
-    let complete = if is_closed { ends.into_iter().any(has) } else { ends.into_iter().all(has) };
-    let absent = ends.into_iter().find(|e| !has(*e)).and_then(|(end, _)| end.copied()).unwrap_or_default();
+    // Whether the first node lies at the begin, and the last one at the end.
+    let are_nodes = ends.map(|(end, node)| {
+        let both = end.zip(node);
+        both.is_some_and(|(end, (_, v))| distance(*end, points[v.index()]) <= tolerance)
+    });
+    // A node at the begin of a closed curve may have been found at its end.
+    let complete = if is_closed { are_nodes.contains(&true) } else { !are_nodes.contains(&false) };
+    let first_absent = are_nodes.iter().position(|is_node| !is_node);
+    let absent = first_absent.and_then(|e| ends[e].0.copied()).unwrap_or_default();
     let mut edges: Vec<Edge> = nodes.windows(2).map(|w| ordered([w[0].1, w[1].1])).collect();
     if let (true, [(_, first), .., (_, last)]) = (is_closed, nodes) {
         edges.push(ordered([*last, *first]));
@@ -154,14 +182,18 @@ fn compare(mesh: &Mesh, chart: ChartId, open: &[[VertexId; 2]], curves: Vec<(u32
 /// The sides of all curves, by where they are.
 struct CurveSides<'a> {
     curves: &'a [Vec<Vec3>],
+    /// Curve by curve, each side as its curve and its number there.
     sides: Vec<(u32, u32)>,
     tree: Bvh,
 }
 
 impl<'a> CurveSides<'a> {
     fn new(curves: &'a [Vec<Vec3>]) -> Self {
-        let count = |c: &Vec<Vec3>| c.len().saturating_sub(1) as u32;
-        let sides: Vec<(u32, u32)> = (0..).zip(curves).flat_map(|(k, c)| (0..count(c)).map(move |i| (k, i))).collect();
+        let mut sides: Vec<(u32, u32)> = Vec::new();
+        for (k, curve) in (0..).zip(curves) {
+            let count = curve.len().saturating_sub(1) as u32;
+            sides.extend((0..count).map(|i| (k, i)));
+        }
         let ends = |(k, i): &(u32, u32)| [0, 1].map(|e| curves[*k as usize][*i as usize + e]);
         let nothing = BoundingBox { min: [0.0; 3], max: [0.0; 3] };
         let tree = Bvh::new(sides.iter().map(|s| BoundingBox::of(ends(s)).unwrap_or(nothing)));

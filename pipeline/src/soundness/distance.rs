@@ -81,6 +81,7 @@ pub(super) fn uncovered(
     let wanted = |t: usize, spacing: f64| (surface.area_of(t).sqrt() / spacing).ceil().clamp(1.0, 200.0);
     let count = |spacing: f64| (0..surface.triangles.len()).map(|t| wanted(t, spacing).powi(2)).sum::<f64>();
     let dense = 0.5 * size;
+    // The number of points falls with the square of the spacing.
     let excess = (count(dense) / SAMPLES).max(1.0).sqrt();
     let spacing = dense * excess;
     let stride = (surface.triangles.len() as f64 / SAMPLES).ceil().max(1.0) as usize;

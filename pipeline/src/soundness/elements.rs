@@ -12,10 +12,19 @@ const AT_TIP: f64 = 1e-9;
 
 /// The ratio of twice the inscribed circle's radius to that of the circumscribed one: 1 for equilateral triangles, 0 for
 /// those without an area (gamma of Gmsh).
+///
+/// ```
+/// use planish_core::soundness::gamma;
+///
+/// let isosceles = |height| [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, height, 0.0]];
+/// assert!((gamma(isosceles(0.75_f64.sqrt())) - 1.0).abs() < 1e-12);
+/// assert!(gamma(isosceles(0.01)) < 0.001, "it falls with the square of the height");
+/// assert_eq!(gamma(isosceles(0.0)), 0.0);
+/// ```
 pub fn gamma(p: [Vec3; 3]) -> f64 {
     let [a, b, c] = [0, 1, 2].map(|k| distance(p[k], p[(k + 1) % 3]));
     let doubled = norm(cross(sub(p[1], p[0]), sub(p[2], p[0])));
-    // 2 r / R = 4 A^2 ... / (s a b c), with A = doubled / 2 and s half the perimeter.
+    // r = A / s and R = a b c / (4 A), with s half the perimeter: 2 r / R = 8 A^2 / (s a b c), and A is half of `doubled`.
     let product = 0.5 * (a + b + c) * a * b * c;
     if product > 0.0 { 2.0 * doubled * doubled / product } else { 0.0 }
 }
@@ -40,8 +49,8 @@ pub fn shapes(mesh: &Triangulation, surface: &Triangulation, min_gamma: f64) -> 
     let tips = if bad.is_empty() { vec![] } else { tips(surface) };
     let reach = AT_TIP * surface.diagonal();
     let at_tip = |v: &VertexId| tips.iter().any(|tip| distance(*tip, mesh.points[v.index()]) <= reach);
-    let (excused, mut below): (Vec<_>, Vec<_>) =
-        bad.into_iter().partition(|(t, _)| mesh.triangles[*t as usize].iter().any(at_tip));
+    let touches_tip = |(t, _): &(u32, f64)| mesh.triangles[*t as usize].iter().any(at_tip);
+    let (excused, mut below): (Vec<_>, Vec<_>) = bad.into_iter().partition(touches_tip);
     below.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
     Shapes {
         min: all.iter().copied().fold(f64::INFINITY, f64::min),

@@ -113,7 +113,6 @@ fn touch(surface: &Triangulation, a: u32, b: u32, contact: f64) -> bool {
     let [p, q] = [a, b].map(|i| surface.corners(i as usize));
     let limit = contact * contact;
     let corner = |p: [Vec3; 3], q: [Vec3; 3]| p.iter().any(|x| on_triangle(*x, q).squared <= limit);
-    let side = |p: [Vec3; 3], k: usize| [p[k], p[(k + 1) % 3]];
     let sides = || (0..9).any(|k| segment_distance(side(p, k / 3), side(q, k % 3)) <= limit);
     corner(p, q) || corner(q, p) || sides()
 }
@@ -129,11 +128,27 @@ fn cross_each_other(mesh: &Triangulation, a: u32, b: u32) -> bool {
     // through the other.
     let Some(of_p) = sides_taken(p, q, |k| t.contains(&s[k])) else { return false };
     let Some(of_q) = sides_taken(q, p, |k| s.contains(&t[k])) else { return false };
-    let side = |p: [Vec3; 3], k: usize| [p[k], p[(k + 1) % 3]];
-    let parted = |taken: [i8; 3], k: usize| taken[k] * taken[(k + 1) % 3] < 0;
-    (0..3).any(|k| {
-        parted(of_p, k) && passes_by_inside(side(p, k), q) || parted(of_q, k) && passes_by_inside(side(q, k), p)
-    })
+    for k in 0..3 {
+        if is_parted(of_p, k) && passes_by_inside(side(p, k), q) {
+            return true;
+        }
+        if is_parted(of_q, k) && passes_by_inside(side(q, k), p) {
+            return true;
+        }
+    }
+    false
+}
+
+/// Side `k` of a triangle.
+#[inline]
+fn side(p: [Vec3; 3], k: usize) -> [Vec3; 2] {
+    [p[k], p[(k + 1) % 3]]
+}
+
+/// Whether the ends of side `k` lie on either side of the plane of the other triangle.
+#[inline]
+fn is_parted(taken: [i8; 3], k: usize) -> bool {
+    taken[k] * taken[(k + 1) % 3] < 0
 }
 
 /// On which side of the plane of `t` the corners of `p` lie, 0 for those that it shares or that rounding could have put

@@ -325,6 +325,24 @@ impl Findings {
 ///
 /// # Panics
 /// Where triangles name points that do not exist, or lists have other lengths than those that they belong to.
+///
+/// ```
+/// use planish_core::shapes;
+/// use planish_core::soundness::{Mesh, Settings, Triangulation, examine};
+///
+/// let soup = shapes::disk(8);
+/// let surface = Triangulation::welded(soup.points(), soup.triangles().iter().copied());
+/// let (charts, mids) = (vec![0; surface.triangles.len()], vec![None; surface.triangles.len()]);
+/// let settings = Settings { size: 0.15, min_gamma: 0.1, off_surface: 1e-6 };
+/// // The surface is a mesh of itself. With one triangle less it has a hole.
+/// let mut mesh = Mesh { triangulation: surface.clone(), mids, charts: None };
+/// let found = examine(&mesh, &surface, &charts, None, &settings);
+/// assert!(found.is_faithful() && found.is_fine() && found.area_ratio == 1.0);
+/// mesh.triangulation.triangles.remove(0);
+/// mesh.mids.remove(0);
+/// let torn = examine(&mesh, &surface, &charts, None, &settings);
+/// assert_eq!(torn.defects[0].to_string(), "the Euler number is 0, that of the surface 1");
+/// ```
 pub fn examine(
     mesh: &Mesh,
     surface: &Triangulation,
@@ -394,6 +412,7 @@ fn by_charts(
 ) -> SurfaceDistance {
     let count = atlas.charts.len();
     let mut per_chart: Vec<Vec<u32>> = vec![Vec::new(); count];
+    // Triangles with labels that no chart has.
     let mut strays: Vec<u32> = Vec::new();
     for (t, label) in labels.iter().enumerate() {
         per_chart.get_mut(*label as usize).unwrap_or(&mut strays).push(t as u32);

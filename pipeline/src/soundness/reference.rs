@@ -20,6 +20,16 @@ impl Triangulation {
     ///
     /// # Panics
     /// Where a triangle names a point that does not exist.
+    ///
+    /// ```
+    /// use planish_core::soundness::Triangulation;
+    ///
+    /// // Two triangles as STL has them: each with corners of its own.
+    /// let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].into_iter();
+    /// let points: Vec<_> = points.chain([[0.0, 1.0, 0.0], [1.0, -0.0, 0.0], [1.0, 1.0, 0.0]]).collect();
+    /// let square = Triangulation::welded(&points, [[0, 1, 2], [3, 4, 5]]);
+    /// assert_eq!((square.points.len(), square.area()), (4, 1.0));
+    /// ```
     pub fn welded(points: &[Vec3], triangles: impl IntoIterator<Item = [u32; 3]>) -> Self {
         let (number, kept) = distinct(points);
         let triangles = triangles.into_iter().map(|t| t.map(|i| number[i as usize])).collect();

@@ -6,6 +6,20 @@ use crate::topology::VertexId;
 use crate::topology::union_find::UnionFind;
 
 /// Numbers of a triangulation that are those of every other one of the same surface.
+///
+/// ```
+/// use planish_core::soundness::Invariants;
+/// use planish_core::topology::{EdgeTable, VertexId};
+///
+/// let of = |triangles: &[[u32; 3]]| {
+///     let triangles: Vec<_> = triangles.iter().map(|t| t.map(VertexId)).collect();
+///     Invariants::of(&triangles, &EdgeTable::new(&triangles))
+/// };
+/// // A square by two triangles, and by four around a node in its middle.
+/// let coarse = of(&[[0, 1, 2], [0, 2, 3]]);
+/// assert_eq!(coarse, of(&[[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]));
+/// assert_eq!((coarse.euler, coarse.components, coarse.open_loops), (1, 1, 1));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Invariants {
     /// Vertices that are used - edges + triangles.

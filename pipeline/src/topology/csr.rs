@@ -91,6 +91,7 @@ impl<T: Clone + Default> Csr<T> {
             lengths[row as usize] += 1;
         }
         let mut sorted = Self::of_lengths(&lengths);
+        // Per row, the place of its next item.
         let mut next = sorted.starts.clone();
         for (row, item) in items() {
             let place = &mut next[row as usize];

@@ -7,6 +7,19 @@ use crate::topology::{EdgeId, FaceId, HalfEdgeId, VertexId};
 /// The edges of a triangulation, each with the half-edges that run along it in either direction.
 ///
 /// Edges are numbered in the order in which the half-edges 0, 1, 2, ... first meet them.
+///
+/// ```
+/// use planish_core::topology::{EdgeTable, HalfEdgeId, VertexId};
+///
+/// // A square: half-edges 0 to 2 run around its first triangle, 3 to 5 around its second one.
+/// let triangles = [[0, 1, 2], [0, 2, 3]].map(|t| t.map(VertexId));
+/// let edges = EdgeTable::new(&triangles);
+/// assert_eq!(edges.len(), 5);
+/// // From 2 to 0, and from 0 to 2.
+/// assert_eq!(edges.twin(HalfEdgeId(2)), Some(HalfEdgeId(3)));
+/// assert_eq!(edges.sides(edges.edge(HalfEdgeId(2))), [HalfEdgeId(2), HalfEdgeId(3)]);
+/// assert!(edges.is_boundary(HalfEdgeId(0)) && edges.twin(HalfEdgeId(0)).is_none());
+/// ```
 #[derive(Clone, Debug)]
 pub struct EdgeTable {
     edge_of: Vec<EdgeId>,
@@ -25,6 +38,8 @@ impl EdgeTable {
         let ends = triangles.iter().flat_map(|t| [0, 1, 2].map(|side| ordered(t, side)));
         let by_lower_end = || ends.clone().zip(0_u32..).map(|((low, high), h)| (low, (high, h)));
         let vertices = triangles.iter().flatten().map(|v| v.index() + 1).max().unwrap_or(0);
+        // A counting sort by the lower end, then a sort of the few edges around each vertex: half-edges are never
+        // sorted all at once.
         let mut at_lower_end = Csr::sorted(vertices, by_lower_end);
         let mut groups: Csr<HalfEdgeId> = Csr::with_capacity(3 * triangles.len());
         let mut group_of = vec![0_u32; 3 * triangles.len()];

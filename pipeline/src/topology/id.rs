@@ -54,6 +54,16 @@ id!(
 );
 id!(
     /// A directed side of a triangle: `3 * face + side`, side 0 runs from corner 0 to corner 1.
+    ///
+    /// ```
+    /// use planish_core::topology::{FaceId, HalfEdgeId};
+    ///
+    /// let h = HalfEdgeId::side_of(FaceId(5), 2);
+    /// assert_eq!(h.to_string(), "h17");
+    /// assert_eq!((h.face(), h.side()), (FaceId(5), 2));
+    /// // Around the same triangle. What is beyond the edge, an `EdgeTable` tells.
+    /// assert_eq!((h.next(), h.prev()), (HalfEdgeId(15), HalfEdgeId(16)));
+    /// ```
     HalfEdgeId,
     "h"
 );

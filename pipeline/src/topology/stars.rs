@@ -4,6 +4,15 @@ use crate::topology::VertexId;
 use crate::topology::csr::Csr;
 
 /// Per vertex, the triangles around it, ascending.
+///
+/// ```
+/// use planish_core::topology::{Stars, VertexId};
+///
+/// let triangles = [[0, 1, 2], [0, 2, 3]].map(|t| t.map(VertexId));
+/// let stars = Stars::new(&triangles, 5);
+/// assert_eq!(stars.around(2), [0, 1]);
+/// assert!(stars.around(4).is_empty(), "no triangle has it for a corner");
+/// ```
 #[derive(Clone, Debug)]
 pub struct Stars {
     faces: Csr<u32>,

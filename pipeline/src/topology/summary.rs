@@ -5,6 +5,17 @@ use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
 /// The numbers that tell what a triangulated surface is.
+///
+/// ```
+/// use planish_core::topology::{EdgeTable, TopologySummary, VertexId};
+///
+/// // A tetrahedron without one of its faces.
+/// let open = [[0, 2, 1], [0, 1, 3], [1, 2, 3]].map(|t| t.map(VertexId));
+/// let summary = TopologySummary::new(&open, &EdgeTable::new(&open));
+/// assert_eq!((summary.vertices, summary.edges, summary.triangles), (4, 6, 3));
+/// assert_eq!((summary.euler, summary.boundary_loops, summary.genus), (1, 1, Some(0)));
+/// assert!(summary.is_one_chart(), "it is a disk");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TopologySummary {
     /// Vertices that a triangle uses.
@@ -32,6 +43,17 @@ pub struct TopologySummary {
 }
 
 /// The sheets around each vertex: corners of triangles, grouped where two triangles share an edge at the vertex.
+///
+/// ```
+/// use planish_core::topology::{EdgeTable, VertexFans, VertexId};
+///
+/// // Two triangles that share vertex 0 and no edge: vertex 0 has two fans, the others one each.
+/// let bow_tie = [[0, 1, 2], [0, 3, 4]].map(|t| t.map(VertexId));
+/// let fans = VertexFans::new(&bow_tie, &EdgeTable::new(&bow_tie));
+/// assert_eq!(fans.count, 6);
+/// assert_ne!(fans.of_corner[0], fans.of_corner[3], "corner 0 of either triangle");
+/// assert_eq!(fans.vertices(&bow_tie)[fans.of_corner[3] as usize], VertexId(0));
+/// ```
 #[derive(Clone, Debug)]
 pub struct VertexFans {
     /// Per corner (`3 * face + corner`), the fan it belongs to; numbered in the order of first corners.
@@ -137,6 +159,7 @@ impl TopologySummary {
         let boundary_loops = count_loops(edges, &fans);
         let cells = triangles.len() as i64 - edges.len() as i64;
         // Sheets that only touch in a vertex are apart: the genus counts a vertex once per fan.
+        // Euler number = 2 components - 2 genus - loops: this is twice the genus.
         let handles = 2 * components as i64 - boundary_loops as i64 - (fans.count as i64 + cells);
         let closed_up = orientable && nonmanifold_edges == 0;
         Self {

@@ -27,6 +27,7 @@ impl UnionFind {
     pub fn merge(&mut self, a: usize, b: usize) -> bool {
         let (a, b) = (self.find(a), self.find(b));
         let (low, high) = (a.min(b), a.max(b));
+        // If both are in one set already, low is high, and nothing changes.
         self.parent[high] = low as u32;
         a != b
     }

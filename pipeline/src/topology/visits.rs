@@ -16,6 +16,7 @@ impl VisitStamps {
 
     /// Begins a new walk: nothing is visited.
     pub(crate) fn clear(&mut self) {
+        // When the numbers begin again, old marks must not count for new walks.
         self.walk = self.walk.checked_add(1).unwrap_or_else(|| {
             self.last.fill(0);
             1
