@@ -66,8 +66,8 @@ pub(super) struct InFlight {
     /// Its place in the order of jobs.
     pub turn: Turn,
     suspect: Mutex<Option<Suspect>>,
-    /// What was foretold that it takes, in bytes.
-    foretold: u64,
+    /// What was predicted that it takes, in bytes.
+    predicted: u64,
     memory: AtomicU64,
     span: Span,
     seconds: Mutex<BTreeMap<&'static str, f64>>,
@@ -88,8 +88,8 @@ impl InFlight {
         // Seen from outside before it waits for memory.
         let number = shared.progress.add(&job);
         let is_to_be_done = job.is_wanted() && job.doubted.is_none();
-        let foretold = if is_to_be_done { memory(&job) } else { 0 };
-        shared.grants.take(Account::Input(lane(job.bytes)), foretold, turn);
+        let predicted = if is_to_be_done { memory(&job) } else { 0 };
+        shared.grants.take(Account::Input(lane(job.bytes)), predicted, turn);
         let span = tracing::info_span!("job", input = escape(&job.name));
         let suspect = Mutex::new(span.in_scope(|| begin(shared, &job)));
         Arc::new(Self {
@@ -100,17 +100,17 @@ impl InFlight {
             settings: shared.settings(),
             turn,
             suspect,
-            foretold,
-            memory: AtomicU64::new(foretold),
+            predicted,
+            memory: AtomicU64::new(predicted),
             span,
             seconds: Mutex::default(),
             end: Mutex::new(None),
         })
     }
 
-    /// What it takes from reading to writing, factors apart, as it was foretold by its size: in bytes.
-    pub fn foretold(&self) -> u64 {
-        self.foretold
+    /// What it takes from reading to writing, factors apart, as it was predicted by its size: in bytes.
+    pub fn predicted(&self) -> u64 {
+        self.predicted
     }
 
     /// How often a process has died while it was on its way.

@@ -16,7 +16,7 @@ use blake3::Hash;
 use crossbeam_channel::Sender;
 use std::sync::Arc;
 
-/// Inputs of which more memory than this (bytes) is foretold get a process of their own. A process costs 8 to 14 ms of
+/// Inputs of which more memory than this (bytes) is predicted get a process of their own. A process costs 8 to 14 ms of
 /// processor time (measured as the difference that `--job-time` makes, on 100 patches of 32 triangles and on 30 of 3,200).
 /// Of 22,000 triangles of binary STL, from which on one is used, that is 2 % of the work; of 3,200 it would be a third.
 const APART: u64 = 32 << 20;
@@ -67,7 +67,7 @@ fn is_apart(in_flight: &InFlight) -> bool {
     let is_limited = in_flight.settings.job_memory.is_some() || in_flight.settings.job_time.is_some();
     // The process of a single job does it itself.
     in_flight.shared.sink.publisher().is_some()
-        && (is_limited || in_flight.deaths() > 0 || in_flight.foretold() >= APART)
+        && (is_limited || in_flight.deaths() > 0 || in_flight.predicted() >= APART)
 }
 
 fn read_here(in_flight: Arc<InFlight>, next: &Next) {

@@ -379,7 +379,7 @@ impl RawSettings {
             return Err(SettingsError::Commands(commands));
         }
         let machine_memory = machine::memory();
-        // Half of it, as what an input takes is foretold: the rest is for what was foretold too low, and for all else.
+        // Half of it, as what an input takes is predicted: the rest is for what was predicted too low, and for all else.
         let memory = self.memory.unwrap_or_else(|| ByteSize::b(machine_memory / 2).max(LEAST_MEMORY));
         if memory < LEAST_MEMORY {
             return Err(SettingsError::Memory(memory));

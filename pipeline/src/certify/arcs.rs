@@ -1,6 +1,6 @@
 //! Premises (c) and (d): loops of quadratic arcs that are star-shaped about a point.
 
-use super::incidence::ArcNodes;
+use super::incidence::ArcNodeIds;
 use crate::grid::{GridPoint, GridVector, bezier_control};
 
 /// A quadratic arc of the boundary: first end, middle node, second end. The ends lie on the grid of vertices.
@@ -41,7 +41,7 @@ impl Arc {
     }
 }
 
-pub(super) fn arc_of(arc: &ArcNodes, nodes: &[GridPoint]) -> Arc {
+pub(super) fn arc_of(arc: &ArcNodeIds, nodes: &[GridPoint]) -> Arc {
     let [from, mid, to] = arc.map(|n| nodes[n as usize]);
     Arc { from, mid, to }
 }

@@ -5,7 +5,7 @@ use crate::topology::csr::Csr;
 use crate::topology::loops::closed_loops;
 
 /// An arc of the boundary by its nodes: first vertex, middle, second vertex, with its triangle on the left.
-pub(super) type ArcNodes = [u32; 3];
+pub(super) type ArcNodeIds = [u32; 3];
 
 /// Why cells are no oriented surface with simple, disjoint boundary loops.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -57,7 +57,7 @@ struct Side {
 }
 
 /// Checks the incidences; returns the boundary loops, each from its least node on, the chart on its left.
-pub(super) fn boundary_loops(cells: &[[u32; 6]], nodes: usize) -> Result<Vec<Vec<ArcNodes>>, IncidenceError> {
+pub(super) fn boundary_loops(cells: &[[u32; 6]], nodes: usize) -> Result<Vec<Vec<ArcNodeIds>>, IncidenceError> {
     if cells.is_empty() {
         return Err(IncidenceError::Empty);
     }
@@ -136,7 +136,7 @@ fn all_sides(cells: &[[u32; 6]], nodes: usize) -> Vec<Side> {
 ///
 /// (The walk itself is the one that makers of charts use; what it walks over is found here, from the cells alone, and a
 /// walk that did not close would be an error.)
-fn loops_of(mut out: Vec<Option<[u32; 2]>>) -> Result<Vec<Vec<ArcNodes>>, IncidenceError> {
+fn loops_of(mut out: Vec<Option<[u32; 2]>>) -> Result<Vec<Vec<ArcNodeIds>>, IncidenceError> {
     let nodes = 0..out.len() as u32;
     let loops = closed_loops(nodes, |from| {
         let [mid, to] = out[from as usize].take()?;

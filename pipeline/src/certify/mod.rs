@@ -14,7 +14,7 @@
 //! neither overlap nor leave the disk. Near any point the map has local degree at least 1; two points with the
 //! same image would give N >= 2 nearby, or N >= 1 > W beside a loop: a contradiction.
 //!
-//! Everything is decided on integers, exactly, from the cells and the places of the nodes alone: [`prove`] knows
+//! Everything is decided on integers, exactly, from the cells and the uv of the nodes alone: [`prove`] knows
 //! nothing of how the map was made. Only it can make a [`CertifiedMap`].
 
 mod arcs;
@@ -32,13 +32,13 @@ pub use polygons::Wrong;
 pub use star::star_centre;
 pub use straight::{StraightError, StraightMap, parts, prove_straight};
 
-/// A quadratic map as it is written: cells of six nodes (vertices, then the middles of 01, 12, 20), the places of
+/// A quadratic map as it is written: cells of six nodes (vertices, then the middles of 01, 12, 20), the uv of
 /// the nodes, and a point in each hole from which the whole loop can be seen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanarMap {
     /// The nodes of each triangle.
     pub cells: Vec<[u32; 6]>,
-    /// The place of each node.
+    /// The uv of each node.
     pub nodes: Vec<GridPoint>,
     /// One point per hole, in any order.
     pub hole_centres: Vec<GridPoint>,
@@ -125,7 +125,7 @@ pub enum Error {
     /// The centre of a hole is too far away, or no double.
     #[error("the centre of hole {hole} lies beyond 2, or its coordinates are no doubles")]
     InexactCentre {
-        /// Its place among the given centres.
+        /// Its position among the given centres.
         hole: usize,
     },
     /// A vertex is off the grid on which midpoints are exact.
@@ -220,7 +220,7 @@ pub fn prove(map: PlanarMap) -> Result<CertifiedMap, Error> {
     Ok(CertifiedMap { map, certificate })
 }
 
-fn arcs_of(boundary_loop: &[incidence::ArcNodes], nodes: &[GridPoint]) -> Vec<Arc> {
+fn arcs_of(boundary_loop: &[incidence::ArcNodeIds], nodes: &[GridPoint]) -> Vec<Arc> {
     boundary_loop.iter().map(|arc| arcs::arc_of(arc, nodes)).collect()
 }
 

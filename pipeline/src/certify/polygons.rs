@@ -11,7 +11,7 @@ use crate::vec3::BoundingBox;
 /// What is wrong with loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrong {
-    /// Two sides cross or touch, each given by its loop and its place there.
+    /// Two sides cross or touch, each given by its loop and its position there.
     Crossing([(usize, usize); 2]),
     /// Not exactly one loop turns left; this one is given as evidence.
     Outer(usize),
@@ -70,7 +70,7 @@ fn crossing(loops: &[Vec<GridPoint>]) -> Option<[(usize, usize); 2]> {
     first.map(|pair| pair.map(|side| sides[side as usize]))
 }
 
-/// A side of a polygon: its loop, and its place there.
+/// A side of a polygon: its loop, and its position there.
 type Side = (usize, usize);
 
 /// The points at which a side begins and ends.

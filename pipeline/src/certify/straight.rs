@@ -63,8 +63,8 @@ pub enum StraightError {
 /// use planish_core::certify::{PlanarMap, StraightError, prove, prove_straight};
 /// use planish_core::grid::GridPoint;
 ///
-/// let places = [[0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.5, 0.2], [0.5, 0.5], [0.1, 0.5]];
-/// let nodes = places.map(GridPoint::vertex).to_vec();
+/// let uv = [[0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.5, 0.2], [0.5, 0.5], [0.1, 0.5]];
+/// let nodes = uv.map(GridPoint::vertex).to_vec();
 /// let map = PlanarMap { cells: vec![[0, 1, 2, 3, 4, 5]], nodes, hole_centres: vec![] };
 /// assert!(prove_straight(map.clone()).is_ok());
 /// assert!(prove(map.clone()).is_err(), "the certifier of curved maps wants the origin inside");
@@ -94,7 +94,7 @@ fn turns_left(map: &PlanarMap, cell: usize) -> bool {
 }
 
 /// A loop of the boundary by its corners: vertices and middles of edges in turn.
-fn polygon(map: &PlanarMap, boundary_loop: &[incidence::ArcNodes]) -> Vec<GridPoint> {
+fn polygon(map: &PlanarMap, boundary_loop: &[incidence::ArcNodeIds]) -> Vec<GridPoint> {
     let mut corners = Vec::with_capacity(2 * boundary_loop.len());
     for [from, mid, _] in boundary_loop {
         corners.push(map.nodes[*from as usize]);
@@ -107,7 +107,7 @@ fn polygon(map: &PlanarMap, boundary_loop: &[incidence::ArcNodes]) -> Vec<GridPo
 mod tests {
     use super::*;
 
-    /// The map with the corners of triangles at these places.
+    /// The map with the corners of triangles at these uv.
     fn map(corners: &[[f64; 2]], triangles: &[[usize; 3]]) -> PlanarMap {
         let mut nodes: Vec<GridPoint> = corners.iter().map(|p| GridPoint::vertex(*p)).collect();
         let mut edges: Vec<[usize; 2]> = Vec::new();
@@ -129,7 +129,7 @@ mod tests {
         PlanarMap { cells, nodes, hole_centres: vec![] }
     }
 
-    /// An L of two squares, each of two triangles, with the corners at these places.
+    /// An L of two squares, each of two triangles, with the corners at these uv.
     fn bent_strip(corners: [[f64; 2]; 6]) -> PlanarMap {
         map(&corners, &[[0, 1, 2], [0, 2, 3], [3, 2, 4], [3, 4, 5]])
     }

@@ -26,8 +26,8 @@ use crate::topology::{ChartId, FaceId, HalfEdgeId, VertexId};
 /// ```
 pub fn assemble(mesh: &SurfaceMesh, labels: &[u32]) -> Result<Atlas, Illegal> {
     let sets = by_label(labels);
-    let mut places = Places::new(mesh, &sets);
-    let charts = sets.into_iter().zip(0..).map(|(faces, id)| chart(mesh, ChartId(id), faces, &mut places));
+    let mut positions = ChartPositions::new(mesh, &sets);
+    let charts = sets.into_iter().zip(0..).map(|(faces, id)| chart(mesh, ChartId(id), faces, &mut positions));
     Ok(Atlas { charts: charts.collect::<Result<_, _>>()?, feature_edges: 0 })
 }
 
@@ -40,14 +40,14 @@ struct Local {
 }
 
 /// Where faces and vertices are in their charts. One table serves all charts: nothing is allocated chart by chart.
-struct Places {
+struct ChartPositions {
     /// Per face, where it is.
     faces: Vec<Local>,
     /// Per vertex, where it is in the chart that was entered last among those that have it.
     vertices: Vec<Local>,
 }
 
-impl Places {
+impl ChartPositions {
     fn new(mesh: &SurfaceMesh, sets: &[Vec<FaceId>]) -> Self {
         let mut faces = vec![Local { chart: 0, number: 0 }; mesh.triangles().len()];
         for (set, chart) in sets.iter().zip(0..) {
@@ -59,13 +59,13 @@ impl Places {
         Self { faces, vertices: vec![nowhere; mesh.points().len()] }
     }
 
-    /// The vertices of a chart, ascending; from now on their places are those in it.
+    /// The vertices of a chart, ascending; from now on their positions are those in it.
     fn enter(&mut self, mesh: &SurfaceMesh, chart: ChartId, faces: &[FaceId]) -> Vec<VertexId> {
         let mut vertices = Vec::new();
         for v in faces.iter().flat_map(|f| mesh.triangles()[f.index()]) {
-            let place = &mut self.vertices[v.index()];
-            if place.chart != chart.0 {
-                place.chart = chart.0;
+            let position = &mut self.vertices[v.index()];
+            if position.chart != chart.0 {
+                position.chart = chart.0;
                 vertices.push(v);
             }
         }
@@ -103,11 +103,16 @@ fn by_label(labels: &[u32]) -> Vec<Vec<FaceId>> {
 ///
 /// # Errors
 /// [`Illegal`] where they form none.
-fn chart(mesh: &SurfaceMesh, id: ChartId, faces: Vec<FaceId>, places: &mut Places) -> Result<Chart, Illegal> {
-    let vertices = places.enter(mesh, id, &faces);
-    let local = |v: VertexId| VertexId(places.vertices[v.index()].number);
+fn chart(
+    mesh: &SurfaceMesh,
+    id: ChartId,
+    faces: Vec<FaceId>,
+    positions: &mut ChartPositions,
+) -> Result<Chart, Illegal> {
+    let vertices = positions.enter(mesh, id, &faces);
+    let local = |v: VertexId| VertexId(positions.vertices[v.index()].number);
     let triangles: Vec<_> = faces.iter().map(|f| mesh.triangles()[f.index()].map(local)).collect();
-    let edges = mesh.edges().part(&faces, |face| places.face_in(id, face));
+    let edges = mesh.edges().part(&faces, |face| positions.face_in(id, face));
     let mut loops = legality::verify(id, &triangles, &edges, vertices.len())?;
     let metric = mesh.metric();
     let shapes = faces.iter().map(|f| metric.shapes[f.index()]).collect();

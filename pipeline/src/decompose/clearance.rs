@@ -22,16 +22,16 @@ pub(super) struct Gaps {
 
 pub(super) fn gaps(network: &Network) -> Result<Gaps, Interrupted> {
     let dual = network.dual;
-    let places = places(network);
-    let domains = domains(network, &places)?;
-    let mut clearance = vec![f64::INFINITY; places.len()];
+    let positions = positions(network);
+    let domains = domains(network, &positions)?;
+    let mut clearance = vec![f64::INFINITY; positions.len()];
     let mut crossing = vec![false; dual.mesh.edges().len()];
     for h in dual.half_edges() {
         let (u, v) = (dual.from(h), dual.to(h));
         let (Some(a), Some(b)) = (domains.label(u), domains.label(v)) else { continue };
         let (Some(to_a), Some(to_b)) = (domains.distance(u), domains.distance(v)) else { continue };
         let gap = to_a + dual.length(h) + to_b;
-        if a != b && along(&places[a], &places[b]) > FAR * gap {
+        if a != b && along(&positions[a], &positions[b]) > FAR * gap {
             crossing[dual.mesh.edges().edge(h).index()] = true;
             for owner in [a, b] {
                 clearance[owner] = clearance[owner].min(gap);
@@ -43,43 +43,44 @@ pub(super) fn gaps(network: &Network) -> Result<Gaps, Interrupted> {
 
 /// Where a vertex lies on the seams: the seam, the way to its begin and to its end, and whether it is closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Place {
+enum SeamPosition {
     Inside,
     Open,
     Seam { curve: usize, from_begin: f64, to_end: f64, closed: bool },
 }
 
-fn places(network: &Network) -> Vec<Place> {
+fn positions(network: &Network) -> Vec<SeamPosition> {
     let dual = network.dual;
-    let vertex = |v: usize| if network.is_open(v) { Place::Open } else { Place::Inside };
-    let mut places: Vec<Place> = (0..dual.mesh.points().len()).map(vertex).collect();
+    let vertex = |v: usize| if network.is_open(v) { SeamPosition::Open } else { SeamPosition::Inside };
+    let mut positions: Vec<SeamPosition> = (0..dual.mesh.points().len()).map(vertex).collect();
     for (curve, path) in network.curves().iter().enumerate() {
         let total: f64 = path.iter().map(|h| dual.length(*h)).sum();
         let closed = dual.is_closed(path);
         let mut from_begin = 0.0;
         for h in path {
-            places[dual.from(*h)] = Place::Seam { curve, from_begin, to_end: total - from_begin, closed };
+            positions[dual.from(*h)] = SeamPosition::Seam { curve, from_begin, to_end: total - from_begin, closed };
             from_begin += dual.length(*h);
             if !closed {
-                places[dual.to(*h)] = Place::Seam { curve, from_begin, to_end: total - from_begin, closed };
+                positions[dual.to(*h)] = SeamPosition::Seam { curve, from_begin, to_end: total - from_begin, closed };
             }
         }
     }
-    places
+    positions
 }
 
-/// The way along the seams between two places, or less.
-fn along(a: &Place, b: &Place) -> f64 {
-    let to_end = |p: &Place| match p {
-        Place::Seam { from_begin, to_end, closed: false, .. } => from_begin.min(*to_end),
-        Place::Seam { .. } => f64::INFINITY,
-        Place::Open | Place::Inside => 0.0,
+/// The way along the seams between two positions, or less.
+fn along(a: &SeamPosition, b: &SeamPosition) -> f64 {
+    let to_end = |p: &SeamPosition| match p {
+        SeamPosition::Seam { from_begin, to_end, closed: false, .. } => from_begin.min(*to_end),
+        SeamPosition::Seam { .. } => f64::INFINITY,
+        SeamPosition::Open | SeamPosition::Inside => 0.0,
     };
     match (a, b) {
-        (Place::Open, Place::Open) => 0.0,
-        (Place::Seam { curve: c, from_begin: s, to_end, closed }, Place::Seam { curve: d, from_begin: t, .. })
-            if c == d =>
-        {
+        (SeamPosition::Open, SeamPosition::Open) => 0.0,
+        (
+            SeamPosition::Seam { curve: c, from_begin: s, to_end, closed },
+            SeamPosition::Seam { curve: d, from_begin: t, .. },
+        ) if c == d => {
             let way = (s - t).abs();
             if *closed { way.min(s + to_end - way) } else { way }
         }
@@ -88,10 +89,10 @@ fn along(a: &Place, b: &Place) -> f64 {
 }
 
 /// Per vertex its distance from the nearest vertex on a seam or at the open boundary, and that vertex.
-fn domains(network: &Network, places: &[Place]) -> Result<ShortestPaths<usize>, Interrupted> {
+fn domains(network: &Network, positions: &[SeamPosition]) -> Result<ShortestPaths<usize>, Interrupted> {
     let dual = network.dual;
-    let mut paths = ShortestPaths::new(places.len(), usize::MAX);
-    for v in (0..places.len()).filter(|v| places[*v] != Place::Inside) {
+    let mut paths = ShortestPaths::new(positions.len(), usize::MAX);
+    for v in (0..positions.len()).filter(|v| positions[*v] != SeamPosition::Inside) {
         paths.start(v, v);
     }
     while let Some(node) = paths.settle() {

@@ -1,7 +1,7 @@
 //! Evaluate: from space to the plane and back, through a map that is linear on straight triangles.
 //!
-//! A [`LinearMap`] holds a triangulation twice, in space and in the plane, as a mesher gets it. [`LinearMap::to_plane`]
-//! takes a point of space to the closest point of the triangulation and that to the plane, [`LinearMap::to_space`] takes a
+//! A [`TriangulatedMap`] holds a triangulation twice, in space and in the plane, as a mesher gets it. [`TriangulatedMap::to_plane`]
+//! takes a point of space to the closest point of the triangulation and that to the plane, [`TriangulatedMap::to_space`] takes a
 //! point of the plane to space. Both always answer with a triangle and weights that add up to 1, and tell how far the
 //! point asked for was from it: on a seam or in a corner the answer is a side or a corner of a triangle there, whichever
 //! way rounding falls.
@@ -24,12 +24,12 @@ use std::sync::OnceLock;
 /// A triangulation in space and in the plane, searched by either.
 ///
 /// ```
-/// use planish_core::evaluate::LinearMap;
+/// use planish_core::evaluate::TriangulatedMap;
 ///
 /// // A square that rises towards its upper side, and its map: the view from above.
 /// let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]];
 /// let uv = points.iter().map(|[x, y, _]| [*x, *y]).collect();
-/// let map = LinearMap::new(points, uv, vec![[0, 1, 2], [0, 2, 3]]);
+/// let map = TriangulatedMap::new(points, uv, vec![[0, 1, 2], [0, 2, 3]]);
 /// let there = map.to_space([0.5, 0.25]).expect("it has triangles");
 /// assert_eq!((there.triangle, map.point_of(&there)), (0, [0.5, 0.25, 0.25]));
 /// let back = map.to_plane([0.5, 0.25, 0.25]).expect("it has triangles");
@@ -39,7 +39,7 @@ use std::sync::OnceLock;
 /// assert_eq!((map.uv_of(&outside), outside.distance), ([1.0, 0.5], 2.0));
 /// ```
 #[derive(Clone, Debug)]
-pub struct LinearMap {
+pub struct TriangulatedMap {
     points: Vec<Vec3>,
     uv: Vec<[f64; 2]>,
     triangles: Vec<[u32; 3]>,
@@ -59,13 +59,13 @@ pub struct Located {
     pub distance: f64,
 }
 
-impl LinearMap {
+impl TriangulatedMap {
     /// A map of `triangles` over nodes whose positions in space are `points`, and in the plane `uv`.
     ///
     /// # Panics
     /// Where there are not as many `uv` as `points`, or a triangle names a node that does not exist.
     pub fn new(points: Vec<Vec3>, uv: Vec<[f64; 2]>, triangles: Vec<[u32; 3]>) -> Self {
-        assert_eq!(points.len(), uv.len(), "every node has both places");
+        assert_eq!(points.len(), uv.len(), "every node has a point and uv");
         let in_space = triangle_bvh(triangles.iter().map(|t| t.map(|n| points[n as usize])));
         Self { points, uv, triangles, in_space, in_plane: OnceLock::new() }
     }
@@ -157,12 +157,12 @@ mod tests {
     use crate::shapes;
 
     /// A bumpy disk, mapped by leaving out the height.
-    fn bumpy() -> LinearMap {
+    fn bumpy() -> TriangulatedMap {
         let soup = shapes::disk(9);
         let height = |p: &Vec3| 0.3 * (3.0 * p[0]).sin() * (2.0 * p[1]).cos();
         let points = soup.points().iter().map(|p| [p[0], p[1], height(p)]).collect();
         let uv = soup.points().iter().map(|p| [p[0], p[1]]).collect();
-        LinearMap::new(points, uv, soup.triangles().to_vec())
+        TriangulatedMap::new(points, uv, soup.triangles().to_vec())
     }
 
     #[test]
@@ -189,6 +189,6 @@ mod tests {
         }
         let outside = map.to_space([2.0, 0.0]).expect("triangles");
         assert!((outside.distance - 1.0).abs() < 1e-3 && outside.weights.iter().all(|w| *w >= 0.0));
-        assert_eq!(LinearMap::new(vec![], vec![], vec![]).to_plane([0.0; 3]), None);
+        assert_eq!(TriangulatedMap::new(vec![], vec![], vec![]).to_plane([0.0; 3]), None);
     }
 }

@@ -16,7 +16,7 @@ const FLAT: f64 = 1e-9;
 /// let plane = Plane::of(flat.points(), flat.triangles()).expect("all its nodes lie in one plane");
 /// assert_eq!(plane.normal(), [0.0, 0.0, 1.0]);
 /// // Distances are those of space; the height above the plane does not count.
-/// let [u, v] = plane.place([3.0, 4.0, 7.0]);
+/// let [u, v] = plane.coords([3.0, 4.0, 7.0]);
 /// assert!((u.hypot(v) - 5.0).abs() < 1e-12);
 /// let bent = shapes::disk(6);
 /// assert_eq!(Plane::of(bent.points(), bent.triangles()), None);
@@ -46,7 +46,7 @@ impl Plane {
         }
         let scale = unit_scale(extent);
         let turns_left = |t: &[u32; 3]| {
-            let [a, b, c] = corners(t).map(|p| GridPoint::mid(plane.place(p).map(|x| x * scale)));
+            let [a, b, c] = corners(t).map(|p| GridPoint::mid(plane.coords(p).map(|x| x * scale)));
             orientation(a, b, c) > 0
         };
         triangles.iter().all(turns_left).then_some(plane)
@@ -74,7 +74,7 @@ impl Plane {
     }
 
     /// Where a point lies in the plane, in the unit of space.
-    pub fn place(&self, x: Vec3) -> [f64; 2] {
+    pub fn coords(&self, x: Vec3) -> [f64; 2] {
         self.axes.map(|axis| dot(sub(x, self.origin), axis))
     }
 }
@@ -100,7 +100,7 @@ mod tests {
         let flat = shapes::flat_disk(6);
         let turned: Vec<Vec3> = flat.points().iter().map(|[x, y, _]| [3.0 + 0.6 * x, *y, 0.8 * x]).collect();
         let plane = Plane::of(&turned, flat.triangles()).expect("it is flat");
-        let [a, b] = [turned[3], turned[9]].map(|p| plane.place(p));
+        let [a, b] = [turned[3], turned[9]].map(|p| plane.coords(p));
         assert!(((a[0] - b[0]).hypot(a[1] - b[1]) - norm(sub(turned[3], turned[9]))).abs() < 1e-12);
         let bump = shapes::disk(6);
         assert_eq!(Plane::of(bump.points(), bump.triangles()), None);

@@ -28,9 +28,9 @@ pub enum Mids {
 /// The outer loop in the plane, in the order of [`FilledChart::outer`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Boundary {
-    /// Per half-edge of the loop, the place of the vertex it begins at.
+    /// Per half-edge of the loop, the uv of the vertex it begins at.
     vertices: Vec<GridPoint>,
-    /// Per half-edge of the loop, the place of its mid-edge node.
+    /// Per half-edge of the loop, the uv of its mid-edge node.
     mids: Vec<GridPoint>,
 }
 
@@ -121,7 +121,7 @@ impl Boundary {
         Ok(Self::through(chart, points, &middle)?.with_mids(mids))
     }
 
-    /// The loop on prescribed places of its vertices and of its mid-edge nodes, both in the order of
+    /// The loop on prescribed uv of its vertices and of its mid-edge nodes, both in the order of
     /// [`FilledChart::outer`].
     ///
     /// # Errors
@@ -135,12 +135,12 @@ impl Boundary {
         Ok(Self { vertices, mids: mids.iter().map(|p| GridPoint::mid(*p)).collect() })
     }
 
-    /// The places of the loop's vertices.
+    /// The uv of the loop's vertices.
     pub fn vertices(&self) -> &[GridPoint] {
         &self.vertices
     }
 
-    /// The places of the loop's mid-edge nodes.
+    /// The uv of the loop's mid-edge nodes.
     pub fn mids(&self) -> &[GridPoint] {
         &self.mids
     }
@@ -162,7 +162,7 @@ impl Boundary {
     pub(crate) fn flatten(&mut self, i: usize, all_the_way: bool) {
         let on_arc = self.mids[i];
         let on_chord = self.chord(i);
-        // Rounded to the grid of mid-edge nodes, on which any integer is a place.
+        // Rounded to the grid of mid-edge nodes, on which any integer is a point.
         let half_way = GridPoint { x: (on_arc.x + on_chord.x) / 2, y: (on_arc.y + on_chord.y) / 2 };
         self.mids[i] = if all_the_way { on_chord } else { half_way };
     }

@@ -178,9 +178,9 @@ pub fn linear_map(chart: &FilledChart, boundary: &Boundary, monitor: &dyn Monito
 
 /// What symmetric weights give.
 struct Attempt {
-    /// The places of the vertices; none where the matrix is not positive definite in doubles.
+    /// The uv of the vertices; none where the matrix is not positive definite in doubles.
     uv: Vec<GridPoint>,
-    /// The triangles folded there; all of them where there are no places.
+    /// The triangles folded there; all of them where there are no uv.
     folds: Vec<FaceId>,
 }
 
@@ -212,7 +212,7 @@ pub fn mean_value_map(chart: &FilledChart, boundary: &Boundary, monitor: &dyn Mo
     }
 }
 
-/// The harmonic P1 map as it is, folded or not: per vertex its place.
+/// The harmonic P1 map as it is, folded or not: per vertex its uv.
 ///
 /// # Errors
 /// [`Error::Solver`]; [`Error::Interrupted`].
@@ -265,8 +265,8 @@ fn dofs(chart: &FilledChart) -> Dofs {
 /// Per vertex where `boundary` has it; the origin inside.
 fn prescribed(chart: &FilledChart, boundary: &Boundary) -> Vec<[f64; 2]> {
     let mut uv = vec![[0.0; 2]; chart.vertex_count()];
-    for (h, place) in chart.outer().iter().zip(boundary.vertices()) {
-        uv[chart.ends(*h)[0].index()] = place.uv();
+    for (h, point) in chart.outer().iter().zip(boundary.vertices()) {
+        uv[chart.ends(*h)[0].index()] = point.uv();
     }
     uv
 }

@@ -61,7 +61,7 @@ struct Chains {
     /// Per segment its ends.
     ends: Vec<[u32; 2]>,
     /// Per welded vertex, where it is.
-    places: Vec<Vec3>,
+    points: Vec<Vec3>,
 }
 
 /// No segment.
@@ -70,21 +70,21 @@ const NONE: u32 = u32::MAX;
 impl Chains {
     fn new(mesh: &SurfaceMesh, boundary: &Boundary, corner: &[bool]) -> Self {
         let mut segments = vec![[NONE; 2]; corner.len()];
-        let mut places = vec![[0.0; 3]; corner.len()];
+        let mut points = vec![[0.0; 3]; corner.len()];
         let mut ends = Vec::with_capacity(boundary.by_segment.len());
         for (segment, steps) in (0..).zip(boundary.by_segment.rows()) {
             let step = boundary.steps[steps[0] as usize];
             ends.push([step.from, step.to]);
             for (welded, vertex) in [step.from, step.to].into_iter().zip(step.ends) {
                 let welded = welded as usize;
-                places[welded] = mesh.points()[vertex.index()].map(|c| c * mesh.metric().scale);
+                points[welded] = mesh.points()[vertex.index()].map(|c| c * mesh.metric().scale);
                 let free = segments[welded].iter().position(|s| *s == NONE);
                 if let Some(free) = free.filter(|_| !corner[welded]) {
                     segments[welded][free] = segment;
                 }
             }
         }
-        Self { segments, ends, places }
+        Self { segments, ends, points }
     }
 
     fn is_inner(&self, v: usize) -> bool {
@@ -116,8 +116,8 @@ impl Chains {
             if ahead.contains(&v) {
                 continue;
             }
-            let [before, after] = ahead.map(|v| self.places[v]);
-            let (come, go) = (sub(self.places[v], before), sub(after, self.places[v]));
+            let [before, after] = ahead.map(|v| self.points[v]);
+            let (come, go) = (sub(self.points[v], before), sub(after, self.points[v]));
             let lengths = norm(come) * norm(go);
             if lengths.is_nan() || lengths <= 0.0 {
                 return None;
@@ -132,7 +132,7 @@ impl Chains {
     fn near(&self, v: usize, segment: u32, spacing: f64, corner: &[bool]) -> Option<Vec<usize>> {
         let (mut at, mut length, mut passed) = (v, 0.0, Vec::new());
         for next in self.walk(v, segment) {
-            length += distance(self.places[at], self.places[next]);
+            length += distance(self.points[at], self.points[next]);
             if length >= spacing {
                 return None;
             }

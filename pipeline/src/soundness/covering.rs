@@ -70,10 +70,10 @@ pub fn check(
 ) -> Vec<Defect> {
     let chart = &atlas.charts[id.index()];
     let nodes = in_plane.nodes(mesh, triangles, id);
-    let places = &boundaries.places[id.index()];
+    let positions = &boundaries.positions[id.index()];
     let uv: Vec<[f64; 2]> = match Plane::of(chart.map.points(), chart.map.triangles()) {
         Some(plane) => in_flat_chart(mesh, &nodes, chart, &plane, distance),
-        None => in_chart(mesh, &nodes, chart, |v, rim| rim.place(places.get(&v)?, &atlas.curves), distance),
+        None => in_chart(mesh, &nodes, chart, |v, rim| rim.place(positions.get(&v)?, &atlas.curves), distance),
     };
     in_plane.place(&nodes, &uv);
     let turn = |t: &u32| {
@@ -111,7 +111,7 @@ fn in_flat_chart(
     let place = |v: &VertexId| {
         let x = mesh.triangulation.points[v.index()];
         distance.note(*v, chart.map.to_plane(x).map_or(f64::INFINITY, |l| l.distance));
-        plane.place(x)
+        plane.coords(x)
     };
     nodes.iter().map(place).collect()
 }

@@ -38,7 +38,7 @@ pub struct Boundaries {
     /// Per chart, the open edges of its mesh, in the direction of its triangles.
     pub open: Vec<Vec<[VertexId; 2]>>,
     /// Per chart, where the nodes of these edges lie on its curves.
-    pub places: Vec<BTreeMap<VertexId, OnCurve>>,
+    pub positions: Vec<BTreeMap<VertexId, OnCurve>>,
     /// What is wrong.
     pub defects: Vec<Defect>,
 }
@@ -51,7 +51,7 @@ pub fn boundaries(mesh: &Mesh, triangles: &[Vec<u32>], atlas: &HandedOverAtlas, 
     let along = nodes_along(atlas, &open, &known);
     let mut found = Boundaries { open, ..Boundaries::default() };
     for (chart, open) in atlas.charts.iter().zip(&found.open) {
-        found.places.push(places_around(chart, open, &known));
+        found.positions.push(places_around(chart, open, &known));
     }
     let mut expected = Vec::with_capacity(atlas.curves.len());
     for ((k, curve), nodes) in (0..).zip(&atlas.curves).zip(&along) {
@@ -86,14 +86,14 @@ fn places_around(
     open: &[[VertexId; 2]],
     known: &BTreeMap<VertexId, Vec<OnCurve>>,
 ) -> BTreeMap<VertexId, OnCurve> {
-    let mut places = BTreeMap::new();
+    let mut positions = BTreeMap::new();
     for v in open.iter().flatten() {
         let mut on_own = known[v].iter().filter(|on| chart.curves.contains(&on.curve));
         if let Some(on) = on_own.next() {
-            places.insert(*v, *on);
+            positions.insert(*v, *on);
         }
     }
-    places
+    positions
 }
 
 /// Per chart, the sides of triangles that no other triangle of the chart has, as the triangles run.

@@ -10,7 +10,7 @@
 //!
 //! *Fine*: no element has a gamma below the least one asked for, but for those in tips of the surface (`elements`).
 //!
-//! What is decided exactly is decided on the grid, from places that are found in doubles: the verdict is one on the mesh
+//! What is decided exactly is decided on the grid, from uv that are found in doubles: the finding is one on the mesh
 //! with its nodes moved by rounding. Distances are measured at nodes and at points of a lattice. Nothing is assumed of
 //! how the mesh was made.
 

@@ -1,6 +1,6 @@
 //! What a mesh is held against: the certified surface, and the maps that the mesher used. And the mesh.
 
-use crate::evaluate::{Bvh, LinearMap, triangle_bvh};
+use crate::evaluate::{Bvh, TriangulatedMap, triangle_bvh};
 use crate::repair::weld::distinct;
 use crate::topology::VertexId;
 use crate::vec3::{BoundingBox, Vec3, triangle_area};
@@ -77,7 +77,7 @@ pub struct HandedOverAtlas {
 #[derive(Clone, Debug)]
 pub struct HandedOverChart {
     /// The triangulation in space and in the plane.
-    pub map: LinearMap,
+    pub map: TriangulatedMap,
     /// The curves that bound it, by their positions in the atlas.
     pub curves: Vec<u32>,
 }

@@ -28,7 +28,11 @@ impl Sample {
             let passages = network.loops(ChartId::at(c)).concat();
             let uv = l.uv().iter().map(|p| p.uv()).collect();
             HandedOverChart {
-                map: crate::evaluate::LinearMap::new(l.nodes().iter().map(point).collect(), uv, l.triangles().to_vec()),
+                map: crate::evaluate::TriangulatedMap::new(
+                    l.nodes().iter().map(point).collect(),
+                    uv,
+                    l.triangles().to_vec(),
+                ),
                 curves: passages.iter().map(|p| p.curve.0).collect(),
             }
         });

@@ -164,7 +164,7 @@ impl LinearChart {
         &self.nodes
     }
 
-    /// Per node of the chart, its place in the plane.
+    /// Per node of the chart, its uv.
     pub fn uv(&self) -> &[GridPoint] {
         &self.uv
     }

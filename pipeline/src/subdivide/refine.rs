@@ -6,7 +6,7 @@
 //! is not positive, the neighbour is split into four too. Halved parts of edges belong to the surface, not to a
 //! triangle, so that triangles in all charts around an edge see the same nodes.
 //!
-//! New nodes lie on the curved map. Their places are computed in integers, exactly, from the nodes of the edge or
+//! New nodes lie on the curved map. Their uv are computed in integers, exactly, from the nodes of the edge or
 //! triangle, and rounded once to the grid: triangles on both sides of an edge get the same numbers. Every triangle
 //! is decided exactly on these.
 //!
@@ -210,14 +210,14 @@ impl<'a> Refiner<'a> {
     }
 
     fn turns_left(&self, face: u32, part: &Part) -> bool {
-        let [a, b, c] = part.map(|corner| self.place(face, corner.at));
+        let [a, b, c] = part.map(|corner| self.uv_at(face, corner.at));
         orientation(a, b, c) > 0
     }
 
-    fn place(&self, face: u32, at: [i64; 3]) -> GridPoint {
+    fn uv_at(&self, face: u32, at: [i64; 3]) -> GridPoint {
         let (chart, local) = self.owner[face as usize];
         let map = self.maps[chart as usize];
-        place(map.cells[local as usize].map(|n| map.nodes[n as usize]), at)
+        uv_at(map.cells[local as usize].map(|n| map.nodes[n as usize]), at)
     }
 
     /// Replaces the triangles of all curved triangles that were looked at. Returns how many of these there are.
@@ -248,7 +248,7 @@ impl<'a> Refiner<'a> {
                 let triangle = part.map(|corner| {
                     *local.entry(corner.node).or_insert_with(|| {
                         fresh.nodes.push(corner.node);
-                        fresh.uv.push(self.place(face, corner.at));
+                        fresh.uv.push(self.uv_at(face, corner.at));
                         fresh.nodes.len() as u32 - 1
                     })
                 });
@@ -270,9 +270,9 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// The place of the point with barycentric coordinates `at` (in units of 2^-`BITS`) of a curved triangle: exact,
+/// The uv of the point with barycentric coordinates `at` (in units of 2^-`BITS`) of a curved triangle: exact,
 /// then rounded to a double that is a multiple of 2^-53.
-fn place(nodes: [GridPoint; 6], at: [i64; 3]) -> GridPoint {
+fn uv_at(nodes: [GridPoint; 6], at: [i64; 3]) -> GridPoint {
     let one = 1_i128 << BITS;
     let l = at.map(i128::from);
     let weights = [

@@ -77,7 +77,7 @@ impl<'a, O: Objective> Problem<'a, O> {
         let mut nodes: Vec<u32> = cells.iter().flat_map(in_chart).chain(of_arcs).collect();
         nodes.sort_unstable();
         nodes.dedup();
-        // From the numbering of the chart to that of the region: the place among all nodes of the region.
+        // From the numbering of the chart to that of the region: the position among all nodes of the region.
         let local = |n: u32| nodes.partition_point(|m| *m < n) as u32;
         let of_cell = cells.iter().map(|c| in_chart(c).map(local)).collect();
         for arc in &mut arcs {
@@ -107,7 +107,7 @@ impl<'a, O: Objective> Problem<'a, O> {
         self.dofs.free()
     }
 
-    /// The nodes that may move, as numbered in the chart, each with its place in `x`.
+    /// The nodes that may move, as numbered in the chart, each with its uv in `x`.
     pub fn moved(&self, x: &[[f64; 2]]) -> impl Iterator<Item = Moved> {
         self.free().iter().map(|n| Moved { node: self.nodes[*n as usize] as usize, uv: x[*n as usize] })
     }

@@ -2,7 +2,7 @@
 //!
 //! Only what [`super::atlas`] writes is read: MSH 4.1, binary, little endian, its `$Entities` and `$Parametrizations`.
 
-use planish_core::evaluate::LinearMap;
+use planish_core::evaluate::TriangulatedMap;
 use planish_core::soundness::{HandedOverAtlas, HandedOverChart};
 use planish_core::vec3::Vec3;
 
@@ -151,7 +151,7 @@ impl<'a> Section<'a> {
         if known { Ok(atlas) } else { Err(self.damaged()) }
     }
 
-    fn map(&mut self) -> Result<LinearMap, AtlasError> {
+    fn map(&mut self) -> Result<TriangulatedMap, AtlasError> {
         self.skip(4)?;
         let nodes = self.count(88)?;
         let triangles = self.count(12)?;
@@ -172,7 +172,7 @@ impl<'a> Section<'a> {
             }
             corners.push(corner.map(|n| n as u32));
         }
-        Ok(LinearMap::new(points, uv, corners))
+        Ok(TriangulatedMap::new(points, uv, corners))
     }
 }
 

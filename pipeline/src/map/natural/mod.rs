@@ -115,7 +115,7 @@ fn fitted(uv: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
         }
     }
     let half_diagonal = 0.5 * (max[0] - min[0]).hypot(max[1] - min[1]);
-    // Infinite where all places are one, zero where one of them is infinite.
+    // Infinite where all uv are one, zero where one of them is infinite.
     let scale = RADIUS / half_diagonal;
     if !scale.is_finite() || scale <= 0.0 {
         return None;

@@ -40,7 +40,7 @@ pub fn projection(chart: &Chart, most: f64) -> Option<Natural> {
         return None;
     }
     // Vertices, then the middles of edges. A projection is linear: the middle goes to the middle.
-    let mut uv: Vec<[f64; 2]> = chart.points().iter().map(|p| plane.place(*p)).collect();
+    let mut uv: Vec<[f64; 2]> = chart.points().iter().map(|p| plane.coords(*p)).collect();
     for (_, sides) in chart.edges().iter() {
         let side = sides[0];
         let [from, to] = [chart.from(side), chart.from(side.next())].map(|v| uv[v.index()]);
