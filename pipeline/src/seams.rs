@@ -138,8 +138,12 @@ impl Curve {
 impl SeamNetwork {
     /// Finds the curves of `charts`, which are those of an atlas of `mesh`, in order. Corners at which an edge of the shape
     /// turns sharply are taken if they are no nearer than `spacing` (in the unit of the input) to others along the curve.
+    ///
+    /// # Panics
+    /// If the number of a chart is not its position: [`crate::CertifiedAtlas::gather`] sees to it.
     pub fn new<C: AsRef<Chart>>(mesh: &SurfaceMesh, charts: &[C], spacing: f64) -> Self {
         let charts: &[&Chart] = &charts.iter().map(AsRef::as_ref).collect::<Vec<_>>();
+        assert!(charts.iter().zip(0..).all(|(chart, id)| chart.id().0 == id), "charts are numbered in their order");
         let boundary = Boundary::new(mesh, charts);
         let mut corner = boundary.corners();
         kinks::mark(mesh, charts, &boundary, spacing, &mut corner);

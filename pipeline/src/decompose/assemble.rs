@@ -24,7 +24,11 @@ use crate::topology::{ChartId, FaceId, HalfEdgeId, VertexId};
 /// assert!(matches!(whole, Err(Illegal::Topology { loops: 0, euler: 2, .. })));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// # Panics
+/// If there is not one label for every triangle.
 pub fn assemble(mesh: &SurfaceMesh, labels: &[u32]) -> Result<Atlas, Illegal> {
+    assert_eq!(labels.len(), mesh.triangles().len(), "a label for every triangle");
     let sets = by_label(labels);
     let mut positions = ChartPositions::new(mesh, &sets);
     let charts = sets.into_iter().zip(0..).map(|(faces, id)| chart(mesh, ChartId(id), faces, &mut positions));

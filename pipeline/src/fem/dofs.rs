@@ -31,11 +31,15 @@ pub struct Dofs {
 }
 
 impl Dofs {
-    /// Unknowns at the nodes `free` (each once) out of `nodes`, numbered in this order.
+    /// Unknowns at the nodes `free` out of `nodes`, numbered in this order.
+    ///
+    /// # Panics
+    /// If a node is named twice, or does not exist.
     pub fn new(nodes: usize, free: Vec<u32>) -> Self {
         let mut unknown_of = vec![PRESCRIBED; nodes];
         for (node, unknown) in free.iter().zip(0..) {
-            unknown_of[*node as usize] = unknown;
+            let before = std::mem::replace(&mut unknown_of[*node as usize], unknown);
+            assert_eq!(before, PRESCRIBED, "node {node} has one unknown");
         }
         Self { unknown_of, free }
     }

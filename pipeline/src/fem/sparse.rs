@@ -274,7 +274,7 @@ impl Factor<'_> {
 /// right-hand sides in place. An estimate of the memory that it takes is reserved.
 ///
 /// # Errors
-/// [`Unsolvable`].
+/// [`Error`]. A safe point.
 ///
 /// # Example
 ///
@@ -287,7 +287,7 @@ impl Factor<'_> {
 /// let mut rhs = [5.0, 8.0];
 /// solve_general(2, &entries, &mut rhs, 1, &NoMonitor)?;
 /// assert!((rhs[0] - 1.0).abs() < 1e-14 && (rhs[1] - 3.0).abs() < 1e-14);
-/// # Ok::<(), planish_core::fem::sparse::Unsolvable>(())
+/// # Ok::<(), planish_core::fem::sparse::Error>(())
 /// ```
 pub fn solve_general(
     unknowns: usize,
@@ -295,18 +295,21 @@ pub fn solve_general(
     rhs: &mut [f64],
     columns: usize,
     monitor: &dyn Monitor,
-) -> Result<(), Unsolvable> {
+) -> Result<(), Error> {
+    if !monitor.should_continue() {
+        return Err(Interrupted.into());
+    }
     let bytes = GROWTH * entries.len() * (size_of::<u32>() + size_of::<f64>());
     let _reserved = Reserved::new(monitor, bytes as u64);
     let (singular, too_large) = (Unsolvable::Singular { unknowns }, Unsolvable::TooLarge { unknowns });
     let triplets: Vec<_> = entries.iter().map(|(r, c, v)| Triplet::new(*r, *c, *v)).collect();
     let matrix = SparseColMat::<u32, f64>::try_new_from_triplets(unknowns, unknowns, &triplets);
-    let Ok(matrix) = matrix else { return Err(too_large) };
-    let Ok(symbolic) = SymbolicLu::try_new(matrix.symbolic()) else { return Err(too_large) };
-    let Ok(factor) = Lu::try_new_with_symbolic(symbolic, matrix.rb()) else { return Err(singular) };
+    let Ok(matrix) = matrix else { return Err(too_large.into()) };
+    let Ok(symbolic) = SymbolicLu::try_new(matrix.symbolic()) else { return Err(too_large.into()) };
+    let Ok(factor) = Lu::try_new_with_symbolic(symbolic, matrix.rb()) else { return Err(singular.into()) };
     factor.solve_in_place(MatMut::from_column_major_slice_mut(rhs, unknowns, columns));
     // What was divided by a pivot of zero is not finite.
-    if rhs.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(singular) }
+    if rhs.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(singular.into()) }
 }
 
 #[cfg(test)]
