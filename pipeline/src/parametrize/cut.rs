@@ -8,7 +8,7 @@
 //! Cutting is no end in itself: more charts mean more curves on which the nodes of a mesh are bound to lie. A cut is
 //! tried, and taken only where all parts suit a mesher and are few.
 
-use super::job::{ChartError, MapError, Maps, map_within};
+use super::job::{ChartError, MapError, Maps, map_whole};
 use crate::atlas::Chart;
 use crate::decompose;
 use crate::map::natural;
@@ -134,7 +134,7 @@ impl Cutter<'_> {
         if let Some(ends) = decompose::contact(chart) {
             return Ok(Attempt::Split(decompose::separate(chart, ends, decompose, monitor)?));
         }
-        let error = match map_within(chart, order, decompose.max_area_ratio, monitor) {
+        let error = match map_whole(chart, order, decompose.max_area_ratio, monitor) {
             Ok(map) => return Ok(Attempt::Mapped(Box::new(map))),
             Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
             Err(error) => error,

@@ -18,6 +18,22 @@ use crate::untangle::{Dirichlet, Untangled, untangle};
 
 /// A chart that is to be mapped, and what its map depends on: a value of its own, which needs neither the surface nor the
 /// other charts, and so can be done anywhere.
+///
+/// ```
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{Plan, Settings, repair, shapes};
+///
+/// let settings = Settings::default();
+/// let mesh = repair(&shapes::finger(12, 22), &settings.repair)?.mesh;
+/// let mut plan = Plan::new(mesh, &settings, &NoMonitor)?;
+/// let job = plan.jobs.remove(0);
+/// let triangles = job.chart.triangles().len();
+/// // A chart may fall into several, where one map would stretch it too much; together they are the chart.
+/// let certified = job.run(&NoMonitor)?;
+/// assert_eq!(certified.iter().map(|c| c.chart().triangles().len()).sum::<usize>(), triangles);
+/// assert!(certified.iter().all(|c| c.distortion().area_ratio <= settings.decompose.max_area_ratio));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ChartJob {
     /// The chart.
@@ -123,7 +139,7 @@ impl ChartJob {
                     continue;
                 }
                 // Its map is what it is.
-                Attempt::Single => map_within(&chart, settings.order, f64::INFINITY, monitor)?,
+                Attempt::Single => map_whole(&chart, settings.order, f64::INFINITY, monitor)?,
             };
             mapped.push(MappedChart { chart, settings, maps });
         }
@@ -187,7 +203,7 @@ impl MappedChart {
 /// # Errors
 /// [`MapError`]: the chart must be split, as [`ChartJob::run`] does.
 pub fn parametrize_chart(chart: Chart, order: Order) -> Result<CertifiedChart, MapError> {
-    let maps = map_within(&chart, order, f64::INFINITY, &NoMonitor)?;
+    let maps = map_whole(&chart, order, f64::INFINITY, &NoMonitor)?;
     let proven = untangle_and_certify(maps, &NoMonitor)?;
     let ratio = distortion::area_ratio(&chart, &proven.map);
     Ok(proven.of(chart, ratio))
@@ -228,48 +244,83 @@ impl From<decompose::Error> for ChartError {
     }
 }
 
-/// Maps `chart` linearly and, for quadratic elements, harmonically. One whose certified map would exceed `max_area_ratio`
-/// need not be mapped.
+/// Maps the whole of `chart` linearly and, for quadratic elements, harmonically. One whose certified map would exceed
+/// `max_area_ratio` need not be mapped.
 ///
 /// # Errors
 /// [`MapError`]: the chart must be split, or nobody waits for the map any more.
-pub(super) fn map_within(
+pub(super) fn map_whole(
     chart: &Chart,
     order: Order,
     max_area_ratio: f64,
     monitor: &dyn Monitor,
 ) -> Result<Maps, MapError> {
     let checkpoint = Checkpoint::new(monitor);
-    let size = chart.triangles().len();
-    let filled = FilledChart::new(chart);
-    checkpoint.after(size)?;
-    let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
-    let mut boundary = Boundary::circle(&filled, mids);
-    let linear = linear_map(&filled, &boundary, monitor)?;
-    checkpoint.end()?;
-    flatten_ear_arcs(&filled, &linear, &mut boundary);
-    let start = linear.degree_elevated(&filled, &boundary);
-    let centres = (0..filled.loops().len()).map(|k| start[filled.centre_node(k)]).collect();
-    let certified_start = prove(planar(&filled, &start, centres)).map_err(MapError::Start)?;
-    checkpoint.after(size)?;
-    let ratio = distortion::area_ratio(chart, &certified_start);
-    let within = |ratio: f64, bound: f64| {
-        let stretched = || MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &certified_start) };
-        if ratio > bound { Err(stretched()) } else { Ok(()) }
+    let start = FeasibleStart::new(chart, order, monitor, &checkpoint)?;
+    let of_start = distortion::area_ratio(chart, &start.certified);
+    if order == Order::Linear {
+        start.refuse_above(max_area_ratio, of_start, chart)?;
+        checkpoint.end()?;
+        return Ok(start.with_harmonic(None));
+    }
+    start.refuse_above(HOPELESS * max_area_ratio, of_start, chart)?;
+    let harmonic = match quadratic_map(&start.filled, &start.boundary, monitor) {
+        Ok(map) => Ok(map),
+        // There is the start.
+        Err(sparse::Error::Unsolvable(unsolvable)) => Err(unsolvable),
+        Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted.into()),
     };
-    within(ratio, if order == Order::Linear { max_area_ratio } else { HOPELESS * max_area_ratio })?;
-    let harmonic = match (order == Order::Quadratic).then(|| quadratic_map(&filled, &boundary, monitor)) {
-        None => None,
-        Some(Ok(map)) => Some(Ok(map)),
-        Some(Err(sparse::Error::Unsolvable(unsolvable))) => Some(Err(unsolvable)),
-        Some(Err(sparse::Error::Interrupted(interrupted))) => return Err(interrupted.into()),
-    };
-    if let Some(Ok(map)) = &harmonic {
-        let of_harmonic = distortion::area_ratio_of_nodes(chart, |f| filled.nodes(f).map(|n| map.nodes()[n]));
-        within(ratio.sqrt() * of_harmonic.sqrt(), max_area_ratio)?;
+    if let Ok(map) = &harmonic {
+        let nodes = |f: usize| start.filled.nodes(f).map(|n| map.nodes()[n]);
+        let of_harmonic = distortion::area_ratio_of_nodes(chart, nodes);
+        // What untangling will make of it lies between both.
+        start.refuse_above(max_area_ratio, of_start.sqrt() * of_harmonic.sqrt(), chart)?;
     }
     checkpoint.end()?;
-    Ok(Maps { filled, linear, start, certified_start, harmonic })
+    Ok(start.with_harmonic(Some(harmonic)))
+}
+
+/// The linear map of a chart, of degree elevated and proven: where untangling begins, and what is published where nothing
+/// better is found.
+struct FeasibleStart {
+    filled: FilledChart,
+    boundary: Boundary,
+    linear: LinearMap,
+    nodes: Vec<GridPoint>,
+    certified: CertifiedMap,
+}
+
+impl FeasibleStart {
+    fn new(chart: &Chart, order: Order, monitor: &dyn Monitor, checkpoint: &Checkpoint) -> Result<Self, MapError> {
+        let triangles = chart.triangles().len();
+        let filled = FilledChart::new(chart);
+        checkpoint.after(triangles)?;
+        // Linear elements have straight edges along the boundary, too.
+        let mids = if order == Order::Linear { Mids::Chord } else { Mids::Arc };
+        let mut boundary = Boundary::circle(&filled, mids);
+        let linear = linear_map(&filled, &boundary, monitor)?;
+        checkpoint.end()?;
+        // The boundary is final from here on: harmonic map, start and result share it.
+        flatten_ear_arcs(&filled, &linear, &mut boundary);
+        let nodes = linear.degree_elevated(&filled, &boundary);
+        let hole_centres = (0..filled.loops().len()).map(|k| nodes[filled.centre_node(k)]).collect();
+        let certified = prove(planar(&filled, &nodes, hole_centres)).map_err(MapError::Start)?;
+        checkpoint.after(triangles)?;
+        Ok(Self { filled, boundary, linear, nodes, certified })
+    }
+
+    /// Refuses a chart whose area `ratio` is above `bound`, with the scales that show where to split it.
+    fn refuse_above(&self, bound: f64, ratio: f64, chart: &Chart) -> Result<(), MapError> {
+        if ratio > bound {
+            return Err(MapError::Stretched { ratio, log_scales: distortion::log_scales(chart, &self.certified) });
+        }
+        Ok(())
+    }
+
+    fn with_harmonic(self, harmonic: Option<Result<QuadraticMap, sparse::Unsolvable>>) -> Maps {
+        let Self { filled, linear, nodes, certified, .. } = self;
+        Maps { filled, linear, start: nodes, certified_start: certified, harmonic }
+    }
 }
 
 /// A chart whose linear map is above the largest area ratio by this factor is split at once. Below it the harmonic map
