@@ -5,6 +5,7 @@ use super::putting_away::NOBODY;
 use super::{Watched, disk, gltf_naming, names};
 use rustix::fs::{CWD, FileType, Mode, mknodat};
 use rustix::process::geteuid;
+use std::collections::BTreeMap;
 use std::fs::{self, Permissions};
 use std::os::unix::fs::{PermissionsExt, chown, symlink};
 use std::os::unix::process::CommandExt;
@@ -98,6 +99,24 @@ fn reached(line: &str) -> Vec<String> {
     paths
 }
 
+/// The lines of a trace; a call during which another thread made one stands on two lines there, and on one here.
+fn whole_calls(trace: &str) -> Vec<String> {
+    const BEGINS: &str = " <unfinished ...>";
+    let mut begun: BTreeMap<&str, &str> = BTreeMap::new();
+    let mut whole = Vec::new();
+    for line in trace.lines() {
+        let thread = line.split(' ').next().unwrap_or_default();
+        if let Some(beginning) = line.strip_suffix(BEGINS) {
+            begun.insert(thread, beginning);
+        } else if let Some((_, end)) = line.split_once(" resumed>") {
+            whole.push(format!("{}{end}", begun.remove(thread).unwrap_or_default()));
+        } else {
+            whole.push(line.to_owned());
+        }
+    }
+    whole
+}
+
 /// The paths that a call names: `3</a>, "b"` is `/a/b`.
 fn operands(call: &str) -> Vec<String> {
     let parts: Vec<&str> = call.split('"').collect();
@@ -139,8 +158,8 @@ fn nothing_outside_of_its_folders_is_ever_opened_whatever_lies_in_the_inbox() {
     w.end_traced();
     let allowed = [w.inbox(), w.out.path().to_owned(), done.clone()];
     let mut seen = 0;
-    for line in traced.lines() {
-        for path in reached(line) {
+    for line in whole_calls(&traced) {
+        for path in reached(&line) {
             let of_the_system = OF_THE_SYSTEM.iter().any(|prefix| path.starts_with(prefix));
             let own = allowed.iter().any(|folder| Path::new(&path).starts_with(folder));
             // Folders above its own are opened, to go down from there and to bring names to disk, but nothing in them.
@@ -166,4 +185,11 @@ fn a_line_of_strace_is_understood() {
     assert!(reached(line).is_empty());
     let line = r#"7 unlinkat(AT_FDCWD</work>, "x/y", 0) = 0"#;
     assert_eq!(reached(line), ["/work/x/y"]);
+    let interrupted = "7  openat(3</in>, \"a\", O_RDONLY|O_DIRECTORY <unfinished ...>\n\
+                       8  unlinkat(4</in>, \"b\", 0 <unfinished ...>\n\
+                       7  <... openat resumed>)             = 20</in/a>\n\
+                       8  <... unlinkat resumed>)           = 0";
+    let calls = whole_calls(interrupted);
+    assert!(calls[0].contains("O_DIRECTORY") && calls.len() == 2, "{calls:?}");
+    assert_eq!((reached(&calls[0]), reached(&calls[1])), (vec!["/in/a".to_owned()], vec!["/in/b".to_owned()]));
 }
