@@ -1,4 +1,4 @@
-//! What takes too long for every change: `cargo test --release -- --ignored full --nocapture`.
+//! What takes too long for every change: `run.sh` beside this file runs it, and all real files.
 //!
 //! Each of these says on standard error what it has run and seen, in a line that begins with `full:`. What there is stands
 //! in [`HEAVY`]; a test that is ignored and does not stand there fails the quick ones, so that none is forgotten.
