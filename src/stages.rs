@@ -169,9 +169,7 @@ pub fn finish(input: Input, found: Repaired, atlas: Atlas, settings: &Settings) 
     let of_charts = settings.core().of_charts();
     let mut done = Vec::new();
     for chart in atlas.into_charts() {
-        for mapped in map(ChartJob { chart, settings: of_charts }, &NoMonitor)? {
-            done.extend(untangle(mapped, &NoMonitor)?);
-        }
+        done.extend(ChartJob { chart, settings: of_charts }.run(&NoMonitor).map_err(not_mapped)?);
     }
     let (certified, files) = assemble(found.mesh, done, whole, settings, &NoMonitor)?;
     Ok((facts.certified(settings, certified), files))

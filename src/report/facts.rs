@@ -95,13 +95,12 @@ impl Facts {
     }
 
     /// The report of an input that is refused, or failed, for this reason.
-    pub fn stopped(self, settings: &Settings, reason: Reason) -> Report {
-        let mut facts = self;
-        if let Some(surface) = &mut facts.surface {
+    pub fn stopped(mut self, settings: &Settings, reason: Reason) -> Report {
+        if let Some(surface) = &mut self.surface {
             // How many charts there would have been is not known to its end.
             surface.decomposition = None;
         }
-        Report { status: reason.status(), reason: Some(reason), ..facts.report(settings) }
+        Report { status: reason.status(), reason: Some(reason), ..self.report(settings) }
     }
 }
 

@@ -247,6 +247,13 @@ pub struct RefusedComponent {
     pub reason: Reason,
 }
 
+impl RefusedComponent {
+    /// Which triangles it has, for people.
+    pub fn extent(&self) -> String {
+        format!("{} triangles from triangle {} on", self.triangles, self.first_triangle)
+    }
+}
+
 /// A chart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChartReport {

@@ -109,12 +109,8 @@ fn text(answer: &Answer, input: &Path) -> String {
 }
 
 fn refused_component(refused: &RefusedComponent) -> String {
-    let RefusedComponent { component, triangles, first_triangle, reason } = refused;
-    let code = reason.code.name();
-    format!(
-        "  refused  component {component} of {triangles} triangles, from triangle {first_triangle} on: {} [{code}]",
-        reason.message
-    )
+    let RefusedComponent { component, reason, .. } = refused;
+    format!("  refused  component {component} of {}: {} [{}]", refused.extent(), reason.message, reason.code.name())
 }
 
 fn counts(title: &str, c: &Counts) -> String {

@@ -182,10 +182,12 @@ fn tell_trouble(job: &Job, end: &End) {
 /// Says on standard error which components of an input are not in its result.
 fn tell_refused(job: &Job, end: &End) {
     let refused = end.standing().map_or(&[][..], |done| &done.report.refused_components);
-    for RefusedComponent { component, triangles, first_triangle, reason } in refused {
+    for refused in refused {
+        let RefusedComponent { component, reason, .. } = refused;
         eprint_line(&format!(
-            "{}: component {component} is refused, of {triangles} triangles from triangle {first_triangle} on: {} [{}]",
+            "{}: component {component} is refused, of {}: {} [{}]",
             escape(&job.path),
+            refused.extent(),
             reason.message,
             reason.code.name()
         ));

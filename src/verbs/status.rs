@@ -70,15 +70,12 @@ fn answer(out: &Path, running: bool, daemon: Option<Status>, health: Health) -> 
 }
 
 fn not_in_result(name: &Path, refused: &RefusedComponent) -> Refusal {
-    let RefusedComponent { component, triangles, first_triangle, reason } = refused;
+    let RefusedComponent { component, reason, .. } = refused;
     Refusal {
         name: name.to_string_lossy().into_owned(),
         status: Outcome::Certified,
         code: Some(reason.code),
-        message: format!(
-            "without component {component}, of {triangles} triangles from triangle {first_triangle} on: {}",
-            reason.message
-        ),
+        message: format!("without component {component}, of {}: {}", refused.extent(), reason.message),
     }
 }
 

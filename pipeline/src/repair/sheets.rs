@@ -197,20 +197,20 @@ impl Components {
         let alone = self.all.iter().enumerate().filter(|(_, component)| is_too_many(component));
         let mut refused: BTreeMap<usize, Why> = alone.map(|(number, _)| (number, Why::Alone)).collect();
         let mut left: Vec<usize> = (0..self.all.len()).filter(|number| !refused.contains_key(number)).collect();
-        // Those whose sheets are smallest last: they go first. Of such as are alike, the last one.
+        // Those whose sheets are smallest first; of such as are alike, the last one.
         let of_sheet = |c: &Component| c.triangles as f64 / c.sheets as f64;
-        left.sort_by(|a, b| of_sheet(&self.all[*b]).total_cmp(&of_sheet(&self.all[*a])));
-        loop {
-            let sheets = left.iter().map(|number| self.all[*number].sheets_beyond()).sum();
-            let triangles = left.iter().map(|number| self.all[*number].triangles).sum();
-            // Ends: one component less each time, and one alone is not too many.
+        left.sort_by(|a, b| of_sheet(&self.all[*a]).total_cmp(&of_sheet(&self.all[*b])).then(b.cmp(a)));
+        let mut sheets: usize = left.iter().map(|number| self.all[*number].sheets_beyond()).sum();
+        let mut triangles: usize = left.iter().map(|number| self.all[*number].triangles).sum();
+        for number in left {
             if !are_too_many(sheets, triangles) {
-                return refused;
+                break;
             }
-            if let Some(number) = left.pop() {
-                refused.insert(number, Why::Together { in_all: sheets });
-            }
+            refused.insert(number, Why::Together { in_all: sheets });
+            sheets -= self.all[number].sheets_beyond();
+            triangles -= self.all[number].triangles;
         }
+        refused
     }
 
     fn refusal(&self, number: usize, why: Why, mesh: &SurfaceMesh) -> RefusedComponent {
