@@ -202,7 +202,8 @@ impl Components {
         left.sort_by(|a, b| of_sheet(&self.all[*a]).total_cmp(&of_sheet(&self.all[*b])).then(b.cmp(a)));
         let mut sheets: usize = left.iter().map(|number| self.all[*number].sheets_beyond()).sum();
         let mut triangles: usize = left.iter().map(|number| self.all[*number].triangles).sum();
-        for number in left {
+        // A component of one sheet adds nothing to the sum: to refuse it, however small it is, would not help.
+        for number in left.into_iter().filter(|number| self.all[*number].sheets_beyond() > 0) {
             if !are_too_many(sheets, triangles) {
                 break;
             }

@@ -439,8 +439,15 @@ fn a_component_is_measured_by_itself_whatever_lies_beside_it() {
     assert_eq!(refused_of(&[crate_of_walls.clone(), block.clone()]), (vec![1], vec![]));
     assert_eq!(refused_of(&[plain, block.clone()]), (vec![1], vec![]));
     // Blocks that are few enough each are too many together: some of them go, and not what has large sheets.
-    let (refused, together) = refused_of(&[small.clone(), crate_of_walls, small.clone(), small.clone(), small]);
+    let blocks = [small.clone(), crate_of_walls, small.clone(), small.clone(), small];
+    let (refused, together) = refused_of(&blocks);
     assert!(!refused.is_empty() && refused == together && !refused.contains(&1), "{refused:?}");
+    // What is a single sheet has no part in that, and be it a single triangle, which no sheet is smaller than.
+    let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let triangle = TriangleSoup::new(corners, vec![[0, 1, 2]]).expect("sound");
+    let with_triangle: Vec<TriangleSoup> = std::iter::once(triangle).chain(blocks).collect();
+    let as_before: Vec<usize> = refused.iter().map(|number| number + 1).collect();
+    assert_eq!(refused_of(&with_triangle), (as_before.clone(), as_before));
 }
 
 #[test]
