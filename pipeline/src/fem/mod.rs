@@ -5,10 +5,9 @@
 //! * [`dofs`]: which node has which unknown; [`assembly`]: systems of elements; [`sparse`]: how they are solved.
 //! * [`bernstein`]: whether a quadratic triangle in the plane is valid, exactly.
 //!
-//! Another element is one more file beside [`element::P2`], and a triangle that is curved in space another
-//! [`geometry::FirstForm`]: systems, quadrature and energies take them as they are. What decides validity, and all that
-//! is built on it (constraints of the untangler, cells of the certifier), is made for quadratic triangles; see
-//! docs/architecture.md.
+//! Another element is one more file beside [`element::P2`], and triangles that are curved in space are others of
+//! [`stiffness::Triangles`]: systems, maps and energies take them as they are. What decides validity, and all that is built on
+//! it (constraints of the untangler, cells of the certifier), is made for quadratic triangles; see docs/architecture.md.
 
 pub mod assembly;
 pub mod bernstein;

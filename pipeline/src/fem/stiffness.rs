@@ -1,8 +1,10 @@
-//! Stiffness matrices by quadrature: the general path, for any element and for triangles that are curved in space.
+//! Stiffness matrices: by quadrature, which is the general path, for any element and for triangles that are curved in
+//! space; and of the triangles of a surface, whichever these are.
 
 use super::element::{Barycentric, Element};
 use super::geometry::FirstForm;
 use super::quadrature::Rule;
+use crate::mesh::TriangleShape;
 
 /// The stiffness matrix int grad phi_i . grad phi_j dA of the Laplacian on a triangle in space, whose first
 /// fundamental form at barycentric coordinates is `metric`, by `rule`.
@@ -50,6 +52,19 @@ pub fn stiffness_by_quadrature<E: Element<N> + ?Sized, const N: usize>(
         }
     }
     k
+}
+
+/// Triangles of a surface in space, as energies see them: flat ones, curved ones, or both.
+pub trait Triangles {
+    /// The stiffness matrix of element `E` on a triangle.
+    fn stiffness<E: Element<N>, const N: usize>(&self, face: usize) -> [[f64; N]; N];
+}
+
+/// Flat triangles.
+impl Triangles for [TriangleShape] {
+    fn stiffness<E: Element<N>, const N: usize>(&self, face: usize) -> [[f64; N]; N] {
+        E::stiffness(&self[face])
+    }
 }
 
 #[cfg(test)]

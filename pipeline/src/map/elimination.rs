@@ -7,7 +7,9 @@
 //! unknowns, and leaves a smaller factor than minimum degree on all of them (by a quarter on surfaces of 100 000
 //! triangles), which cannot see what vertices and edges have to do with each other.
 
+use super::nodes::Nodes;
 use crate::fem::dofs::Dofs;
+use crate::fem::element::Element;
 use crate::map::filled::FilledChart;
 use crate::topology::{HalfEdgeId, VertexId};
 
@@ -26,33 +28,36 @@ pub(crate) fn of_vertices(triangles: &[[VertexId; 3]], count: usize, outer: &[Ha
     unknowns.into_iter().map(|unknown| VertexId(dofs.free()[unknown as usize])).collect()
 }
 
-/// All nodes of quadratic elements in the order in which they are eliminated; those of which no vertex inside is an
-/// end come last.
-pub(crate) fn of_nodes(chart: &FilledChart) -> Vec<usize> {
+/// All nodes of an element in the order in which they are eliminated; those of which no vertex inside is an end come last.
+pub(crate) fn of_nodes<E: Element<N>, const N: usize>(nodes: &Nodes<E, N>, chart: &FilledChart) -> Vec<usize> {
     let last = chart.elimination().len() as u64;
     let mut turn = vec![last; chart.vertex_count()];
     for (v, n) in chart.elimination().iter().zip(0..) {
         turn[v.index()] = n;
     }
-    // The vertex of turn n has the key 2n + 1, and the nodes of edges that go before it have 2n. Keys of several nodes
-    // may be equal: the number of the node, second in each pair, decides.
-    let mut keyed: Vec<(u64, usize)> = Vec::with_capacity(chart.node_count());
+    // The vertex of turn n has the key 2n + 1, and the nodes that go before it have 2n. Keys of several nodes may be equal:
+    // the number of the node, second in each pair, decides.
+    let mut keyed: Vec<(u64, usize)> = Vec::with_capacity(nodes.count());
     for (_, sides) in chart.edges().iter() {
         let [a, b] = chart.ends(sides[0]).map(|v| turn[v.index()]);
-        keyed.push((2 * a.min(b), chart.mid_node(sides[0])));
+        keyed.extend((0..Nodes::<E, N>::PER_EDGE).map(|k| (2 * a.min(b), nodes.along(sides[0], k))));
+    }
+    for (face, corners) in chart.triangles().iter().enumerate() {
+        let [a, b, c] = corners.map(|v| turn[v.index()]);
+        keyed.extend((0..Nodes::<E, N>::PER_TRIANGLE).map(|k| (2 * a.min(b).min(c), nodes.inside(face, k))));
     }
     for (v, n) in (0..).map(VertexId).zip(&turn) {
-        keyed.push((2 * n + 1, chart.vertex_node(v)));
+        keyed.push((2 * n + 1, nodes.at_vertex(v)));
     }
     keyed.sort_unstable();
     keyed.into_iter().map(|(_, node)| node).collect()
 }
 
-/// The unknowns of quadratic elements in the order in which they are eliminated: all nodes but those of the outer loop.
-pub(crate) fn dofs_inside(chart: &FilledChart) -> Dofs {
-    let is_outer = chart.outer_nodes();
-    let inside = of_nodes(chart).into_iter().filter(|n| !is_outer[*n]);
-    Dofs::new(chart.node_count(), inside.map(|n| n as u32).collect())
+/// The unknowns of an element in the order in which they are eliminated: all nodes but those of the outer loop.
+pub(crate) fn dofs_inside<E: Element<N>, const N: usize>(nodes: &Nodes<E, N>, chart: &FilledChart) -> Dofs {
+    let is_outer = nodes.is_outer();
+    let inside = of_nodes(nodes, chart).into_iter().filter(|n| !is_outer[*n]);
+    Dofs::new(nodes.count(), inside.map(|n| n as u32).collect())
 }
 
 #[cfg(test)]
@@ -69,7 +74,8 @@ mod tests {
     /// How many numbers the factor of quadratic elements holds, nodes on the outer loop prescribed: in our order, and in
     /// that of minimum degree on all nodes.
     fn factor_entries(chart: &FilledChart) -> [usize; 2] {
-        let pattern = dofs_inside(chart).pattern((0..chart.triangles().len()).map(|f| chart.nodes(f)));
+        let pattern =
+            dofs_inside(&chart.quadratic_nodes(), chart).pattern((0..chart.triangles().len()).map(|f| chart.nodes(f)));
         [pattern.analyse_as_numbered(), pattern.analyse()].map(|a| a.expect("small").factor_entries())
     }
 
@@ -81,7 +87,7 @@ mod tests {
             vertices.extend(chart.outer().iter().map(|h| chart.ends(*h)[0]));
             vertices.sort_unstable();
             assert!(vertices.into_iter().eq((0..chart.vertex_count()).map(VertexId::at)));
-            let mut nodes = of_nodes(&chart);
+            let mut nodes = of_nodes(&chart.quadratic_nodes(), &chart);
             nodes.sort_unstable();
             assert!(nodes.into_iter().eq(0..chart.node_count()));
         }

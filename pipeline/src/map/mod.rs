@@ -3,7 +3,9 @@
 pub mod boundary;
 mod elimination;
 pub mod filled;
+pub mod harmonic;
 pub mod linear;
 pub mod natural;
+pub mod nodes;
 pub mod quadratic;
 mod weights;

@@ -1,15 +1,13 @@
 //! Quadratic map: the harmonic map by P2 finite elements.
 //!
 //! u and v solve two Laplace problems over the chart (holes closed by virtual fans) by 6-node triangles, with the
-//! nodes of the outer loop prescribed: one factorisation, two right-hand sides. Triangles are flat in space, their
-//! metric is constant. The map minimises the Dirichlet energy among all quadratic maps with these boundary
+//! nodes of the outer loop prescribed ([`super::harmonic`], for quadratic elements). The map minimises the Dirichlet energy among all quadratic maps with these boundary
 //! values; it need not be valid, and typically a few triangles in a thousand are not.
 
-use super::elimination;
+use super::harmonic::{dirichlet_energy, harmonic_map};
 use crate::fem::bernstein::{self, JacobianBezier, Validity};
-use crate::fem::element::{self, Element, P2};
+use crate::fem::element::P2;
 use crate::fem::jacobian::CornerDerivatives;
-use crate::fem::laplace;
 use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::map::boundary::Boundary;
@@ -94,28 +92,17 @@ pub fn quadratic_map(
     boundary: &Boundary,
     monitor: &dyn Monitor,
 ) -> Result<QuadraticMap, sparse::Error> {
-    let checkpoint = Checkpoint::new(monitor);
-    let dofs = elimination::dofs_inside(chart);
-    let prescribed = on_boundary(chart, boundary);
-    let stiffness = |face: usize| P2::stiffness(&chart.shapes()[face]);
-    let faces = chart.triangles().len();
-    let uv = laplace::harmonic(&dofs, faces, |f| chart.nodes(f), stiffness, prescribed, &checkpoint)?;
+    let on_outer = |edge: usize, share: f64| {
+        let at = if share == 0.0 { boundary.vertices() } else { boundary.mids() };
+        at[edge].uv()
+    };
+    let uv = harmonic_map::<P2, 6>(chart, on_outer, monitor)?;
     let nodes = to_grid(chart, &uv);
-    checkpoint.after(faces)?;
+    Checkpoint::new(monitor).after(chart.triangles().len())?;
     let invalid = invalid_triangles(chart, &nodes);
     // Of the solution itself: the grid ends not far outside the disk, and what was cut off there is no lower bound.
-    let energy = energy_of(chart, &uv);
+    let energy = dirichlet_energy::<P2, 6>(chart, &uv);
     Ok(QuadraticMap { uv, nodes, invalid, energy })
-}
-
-/// Per node of the outer loop where `boundary` has it; the origin inside.
-fn on_boundary(chart: &FilledChart, boundary: &Boundary) -> Vec<[f64; 2]> {
-    let mut uv = vec![[0.0; 2]; chart.node_count()];
-    for (i, h) in chart.outer().iter().enumerate() {
-        uv[chart.vertex_node(chart.ends(*h)[0])] = boundary.vertices()[i].uv();
-        uv[chart.mid_node(*h)] = boundary.mids()[i].uv();
-    }
-    uv
 }
 
 /// Rounds the nodes of a filled chart to the grid: vertices to that of vertices, all others to that of mid-edge
@@ -158,15 +145,8 @@ pub fn min_det(chart: &FilledChart, map: &QuadraticMap) -> f64 {
 
 /// The Dirichlet energy of a map of the filled chart, fans included.
 pub fn energy(chart: &FilledChart, nodes: &[GridPoint]) -> f64 {
-    energy_of(chart, &nodes.iter().map(|p| p.uv()).collect::<Vec<_>>())
-}
-
-fn energy_of(chart: &FilledChart, uv: &[[f64; 2]]) -> f64 {
-    let of_face = |f: usize| {
-        let stiffness = P2::stiffness(&chart.shapes()[f]);
-        element::energy(&stiffness, &chart.nodes(f).map(|n| uv[n]))
-    };
-    (0..chart.triangles().len()).map(of_face).sum()
+    let uv: Vec<[f64; 2]> = nodes.iter().map(|p| p.uv()).collect();
+    dirichlet_energy::<P2, 6>(chart, &uv)
 }
 
 #[cfg(test)]

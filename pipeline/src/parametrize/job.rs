@@ -360,7 +360,7 @@ fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, 
     let mut invalid = vec![false; filled.chart_triangles()];
     map.invalid().iter().for_each(|f| invalid[f.index()] = true);
     let harmonic = Some(Harmonic { invalid, det_min: min_det(&filled, &map) });
-    let energy = Dirichlet::new(filled.shapes());
+    let energy = Dirichlet::new(&filled);
     let Untangled { nodes, hole_centres, mut report } = untangle(&filled, &energy, &start, &map, monitor)?;
     Checkpoint::new(monitor).end()?;
     let certified = match prove(planar(&filled, &nodes, hole_centres)) {

@@ -146,7 +146,7 @@ impl Stats {
 /// let start = linear.degree_elevated(&chart, &boundary);
 /// let harmonic = quadratic_map(&chart, &boundary, &NoMonitor)?;
 /// assert!(!harmonic.invalid().is_empty());
-/// let objective = Dirichlet::new(chart.shapes());
+/// let objective = Dirichlet::new(&chart);
 /// let report = untangle(&chart, &objective, &start, &harmonic, &NoMonitor)?.report;
 /// assert!(report.energy_unconstrained < report.energy && report.energy < report.energy_start);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -1,7 +1,7 @@
 //! What untangling minimises.
 
-use crate::fem::element::{self, Element, P2, P2Nodes};
-use crate::mesh::TriangleShape;
+use crate::fem::element::{self, P2, P2Nodes};
+use crate::fem::stiffness::Triangles;
 use crate::topology::FaceId;
 
 /// The scalar unknowns of a triangle: u and v at six nodes, u0, v0, u1, and so on.
@@ -29,7 +29,7 @@ pub struct LocalModel {
 /// use planish_core::topology::FaceId;
 /// use planish_core::untangle::{Dirichlet, LocalModel, Objective};
 ///
-/// struct Weighted<'a>(Dirichlet<'a>, &'a [f64]);
+/// struct Weighted<'a>(Dirichlet<'a, [TriangleShape]>, &'a [f64]);
 ///
 /// impl Objective for Weighted<'_> {
 ///     fn value(&self, face: FaceId, x: &P2Nodes) -> f64 {
@@ -49,7 +49,7 @@ pub struct LocalModel {
 /// let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 /// let nodes = P2::NODES.map(|l| P1::interpolate(&corners.map(|[x, y, _]| [x, y]), l));
 /// let shapes = [TriangleShape::of(corners)];
-/// let objective = Weighted(Dirichlet::new(&shapes), &[3.0]);
+/// let objective = Weighted(Dirichlet::new(&shapes[..]), &[3.0]);
 /// assert!((objective.value(FaceId(0), &nodes) - 3.0 * 0.5).abs() < 1e-14);
 /// ```
 pub trait Objective {
@@ -66,23 +66,24 @@ pub trait Objective {
 }
 
 /// The Dirichlet energy 1/2 int |grad u|^2 + |grad v|^2 over the surface, whose minimiser is harmonic.
-#[derive(Clone, Copy, Debug)]
-pub struct Dirichlet<'a> {
-    shapes: &'a [TriangleShape],
+#[derive(Debug)]
+pub struct Dirichlet<'a, T: ?Sized> {
+    triangles: &'a T,
 }
 
-impl<'a> Dirichlet<'a> {
-    /// Of maps of the triangles with these shapes.
-    pub fn new(shapes: &'a [TriangleShape]) -> Self {
-        Self { shapes }
+impl<'a, T: Triangles + ?Sized> Dirichlet<'a, T> {
+    /// Of maps of these triangles: a chart's (a [`FilledChart`](crate::map::filled::FilledChart), flat or curved), or
+    /// flat ones of these shapes.
+    pub fn new(triangles: &'a T) -> Self {
+        Self { triangles }
     }
 
     fn stiffness(&self, face: FaceId) -> [[f64; 6]; 6] {
-        P2::stiffness(&self.shapes[face.index()])
+        self.triangles.stiffness::<P2, 6>(face.index())
     }
 }
 
-impl Objective for Dirichlet<'_> {
+impl<T: Triangles + ?Sized> Objective for Dirichlet<'_, T> {
     fn value(&self, face: FaceId, x: &P2Nodes) -> f64 {
         element::energy(&self.stiffness(face), x)
     }
@@ -113,6 +114,7 @@ impl Objective for Dirichlet<'_> {
 pub(super) mod tests {
     use super::*;
     use crate::fem::jacobian::samples::{X, Y, moved};
+    use crate::mesh::TriangleShape;
 
     /// That gradient and Hessian are the derivatives of the value at X along Y, and the Hessian is no smaller than the
     /// true one.
@@ -132,6 +134,6 @@ pub(super) mod tests {
 
     #[test]
     fn the_model_of_the_dirichlet_energy_holds_its_derivatives() {
-        check_derivatives(&Dirichlet::new(&[TriangleShape { lengths: [1.0, 0.7, 0.9] }]));
+        check_derivatives(&Dirichlet::new(&[TriangleShape { lengths: [1.0, 0.7, 0.9] }][..]));
     }
 }

@@ -21,7 +21,7 @@ fn prepared(soup: &TriangleSoup) -> (FilledChart, Vec<GridPoint>, QuadraticMap) 
 }
 
 fn untangled(chart: &FilledChart, start: &[GridPoint], harmonic: &QuadraticMap) -> Untangled {
-    untangle(chart, &Dirichlet::new(chart.shapes()), start, harmonic, &NoMonitor).expect("nobody interrupts")
+    untangle(chart, &Dirichlet::new(chart), start, harmonic, &NoMonitor).expect("nobody interrupts")
 }
 
 fn check(chart: &FilledChart, untangled: &Untangled) {
@@ -59,7 +59,7 @@ fn a_bent_disk_is_untangled_close_to_the_harmonic_map_on_both_paths() {
     check(&chart, &got);
     let mut stats = Stats::default();
     let nodes = {
-        let energy = Dirichlet::new(chart.shapes());
+        let energy = Dirichlet::new(&chart);
         feasible::untangle(&chart, &energy, &start, &mut stats, &Checkpoint::new(&NoMonitor)).expect("small")
     };
     assert!(valid(&chart, &nodes).is_some());
@@ -161,7 +161,7 @@ fn a_valid_minimiser_of_another_objective_is_the_result() {
 #[test]
 fn interrupted_at_any_time_there_is_no_result() {
     let (chart, start, harmonic) = prepared(&shapes::bent_disk(16, 0.45, 1.0));
-    let energy = Dirichlet::new(chart.shapes());
+    let energy = Dirichlet::new(&chart);
     let patient = CountDown::new(usize::MAX);
     untangle(&chart, &energy, &start, &harmonic, &patient).expect("nobody interrupts");
     let asked = usize::MAX - patient.left.into_inner();
