@@ -139,16 +139,24 @@ impl<'a> Evaluated<'a> {
     /// becomes shorter by shrinking to a point, and the chart around it is the more distorted for it.
     fn dearer(&self, before: &Loops, straight: &Self) -> Vec<[u32; 2]> {
         let after = straight.loops();
-        let cost = |evaluated: &Self, pair: &[u32; 2], length: f64| {
-            let of = |label: u32| evaluated.predictions[label as usize].map_or(1.0, |v| v.ratio);
-            let area: f64 = pair.iter().map(|l| evaluated.network.areas[*l as usize]).sum();
-            length / area.sqrt() + of(pair[0]).max(of(pair[1])).log10()
-        };
-        let length = |path: &[HalfEdgeId]| length(self.network.dual, path);
-        let is_dearer = |pair: &[u32; 2], path: &[HalfEdgeId]| {
-            after.get(pair).is_none_or(|a| cost(straight, pair, length(a)) > cost(self, pair, length(path)))
-        };
-        before.iter().filter(|(pair, path)| is_dearer(pair, path)).map(|(pair, _)| *pair).collect()
+        let mut dearer = Vec::new();
+        for (pair, path) in before {
+            // Where the loops of a pair are gone they have shrunk to nothing.
+            let is_dearer = after.get(pair).is_none_or(|now| straight.cost(*pair, now) > self.cost(*pair, path));
+            if is_dearer {
+                dearer.push(*pair);
+            }
+        }
+        dearer
+    }
+
+    /// What the closed seams `path` between two charts cost: a decade of the area ratio counts as much as a length like the
+    /// size of both charts together.
+    fn cost(&self, pair: [u32; 2], path: &[HalfEdgeId]) -> f64 {
+        let [left, right] = pair.map(|label| self.predictions[label as usize].map_or(1.0, |p| p.ratio));
+        let area: f64 = pair.iter().map(|label| self.network.areas[*label as usize]).sum();
+        let relative_length = length(self.network.dual, path) / area.sqrt();
+        relative_length + left.max(right).log10()
     }
 
     /// The half-edges of all closed seams between two charts, by their labels.
