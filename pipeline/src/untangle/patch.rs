@@ -168,10 +168,13 @@ impl<'a, O: Objective> PatchContext<'a, O> {
         let space: Vec<f64> = chart.shapes().iter().map(|s| s.area()).collect();
         let mut density = Vec::with_capacity(plane.len());
         for (t, area) in chart.triangles().iter().zip(&space) {
+            // Those at its corners, itself three times: one triangle that the linear map presses flat says nothing of what is
+            // typical there.
             let around = || t.iter().flat_map(|v| stars.around(v.index())).map(|g| *g as usize);
-            let in_plane = around().map(|g| plane[g]).sum::<f64>();
-            let in_space = around().map(|g| space[g]).sum::<f64>();
-            density.push(in_plane / in_space * area);
+            let in_plane: f64 = around().map(|g| plane[g]).sum();
+            let in_space: f64 = around().map(|g| space[g]).sum();
+            let area_scale = in_plane / in_space;
+            density.push(area_scale * area);
         }
         let centres: Vec<GridPoint> = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
         let start = uv_of(start, &centres);
