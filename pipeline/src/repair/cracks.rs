@@ -13,7 +13,8 @@ use crate::topology::union_find::UnionFind;
 use crate::topology::{HalfEdgeId, VertexId};
 use crate::vec3::{Vec3, distance, dot, midpoint, norm, sub};
 
-/// Triangles on the same side of an edge within this angle (10 degrees) face each other: the cosine.
+/// Triangles on the same side of an edge within this angle (10 degrees) face each other: the cosine. By experience: a smaller
+/// angle joins the walls of gaps that are not quite even, a larger one leaves cracks along the edges of blades open.
 pub(super) const FACING: f64 = 0.985;
 
 /// Tolerances below this share of the largest coordinate are rounding: nothing is joined.

@@ -31,11 +31,12 @@ use crate::vec3::{Vec3, cross, dot, norm, sub};
 /// The least tolerance, as a share of the largest coordinate: four units in the last place.
 pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Boxes, points and edges that are looked at, per boundary edge and vertex on average.
+/// Boxes, points and edges that are looked at, per boundary edge and vertex on average. By experience: a way down the tree
+/// takes about 2 log2 n, 40 of a million; it bounds the time that a file made for that can take.
 const LOOKS: usize = 100;
 
 /// Edges that run along one place of a long edge, and long edges on which a vertex lies, at most; where there are more, it
-/// is as if some faced each other.
+/// is as if some faced each other. By experience: all pairs of them are compared.
 const CROWD: usize = 8;
 
 /// The boundary of a triangulation, and how near is near.

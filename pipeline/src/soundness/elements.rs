@@ -136,7 +136,8 @@ fn is_valid(corners: [Vec3; 3], mids: [Vec3; 3]) -> bool {
     is_positive([mixed(0, 0), mixed(1, 1), mixed(2, 2), mixed(0, 1), mixed(1, 2), mixed(2, 0)], HALVINGS)
 }
 
-/// How often the triangle is quartered for a bound.
+/// How often the triangle is quartered for a bound: into 4,096 parts at worst. By experience: more decides more
+/// of the elements that are nearly folded, and each costs four times as much.
 const HALVINGS: u32 = 6;
 
 /// Whether a quadratic form with coefficients at 00, 11, 22, 01, 12, 20 is positive on the triangle.
