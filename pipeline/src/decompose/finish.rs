@@ -17,8 +17,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
 /// seams along a tube come together. So the area ratio is predicted again after every step, and the last good one kept.
-/// The last, widest step came with the aorta, whose seams it makes rings. How far the steps go decides little: half and twice
-/// as far gave 777 and 772 charts instead of 773 on 18 meshes of up to 19,000 triangles, and seams as long within 1 % on average.
+/// The last, widest step came with the aorta, whose seams it makes rings. How far the steps go decides little: half and
+/// twice as far gave 777 and 772 charts instead of 773 on 18 meshes of up to 19,000 triangles, and seams as long within 1 %
+/// on average.
 const BANDS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// How far seams may be straightened, as a share of the narrowest gap beside them: below a half, so that two seams that move

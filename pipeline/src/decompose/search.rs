@@ -18,7 +18,8 @@ use crate::monitor::{Checkpoint, Interrupted};
 /// gebco_seabed and retinal_miq, and 6 to 26 % shorter on max_planck and punctured_torus.
 const BALANCED: Weights = Weights { ratio: 1.0, roundness: 0.6, spread: 0.5, shared: 0.0 };
 
-/// The same, where outlines that vanish count and the area ratio counts half: regions that lie deep in each other unite early.
+/// The same, where outlines that vanish count and the area ratio counts half: regions that lie deep in each other unite
+/// early.
 const COMPACT: Weights = Weights { ratio: 0.5, roundness: 0.6, spread: 0.5, shared: 1.0 };
 
 /// A strategy of growing charts.
