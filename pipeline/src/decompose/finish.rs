@@ -32,7 +32,7 @@ const SHARE: f64 = 0.3;
 const BENT: f64 = 1.15;
 
 /// The parts of seams that are tried one after the other where not all can be straightened at once. More parts find a neck
-/// more closely, and each costs a prediction for the whole surface.
+/// more closely, and each costs a prediction for the whole surface. By experience.
 const PARTS: usize = 8;
 
 /// Straightens the seams between labels and makes the charts. `size` tells that of a cell.
