@@ -258,7 +258,8 @@ impl CertifiedAtlas {
 }
 
 /// A place is narrow if it is narrower than this share of an edge. Corners of the shape that are nearer together are not
-/// all kept, as they would make narrow places.
+/// all kept, as they would make narrow places. By experience: lower leaves elements across that lean, higher makes small
+/// ones where those of the size would do.
 pub const NARROW: f64 = 0.75;
 
 /// Per triangle of `mesh`, the position of the chart that it belongs to.

@@ -70,6 +70,7 @@ const ENDED: usize = 64;
 pub const CHAINED: usize = 1024;
 
 /// Results that are written at once, per lane, where `--jobs` is less: writing waits for the disk, not for a processor.
+/// By experience: more wait for the same disk, and each has a result in memory.
 const WRITERS: usize = 4;
 
 /// The running stages.

@@ -33,10 +33,11 @@ const QUICK: f64 = 4_500.0;
 /// The largest area ratio of such a chart: MeshAdapt cuts off what a map shrinks (gebco_seabed, at 5e4).
 const EVEN: f64 = 100.0;
 
-/// Every loop of a chart gets at least so many edges.
+/// Every loop of a chart gets at least so many edges: an octagon has 0.90 of the area of its circle, a hexagon 0.83.
 const EDGES_PER_LOOP: f64 = 8.0;
 
-/// A chart is so many elements wide at least, unless it is as wide as an edge is long.
+/// A chart is so many elements wide at least, unless it is as wide as an edge is long. By experience: more makes
+/// many elements in strips that one row would fill.
 const ELEMENTS_ACROSS: f64 = 1.5;
 
 /// The same for charts that share two curves without a common end, as the two sides of a thin strip do: an edge across such a

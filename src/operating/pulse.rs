@@ -10,7 +10,8 @@
 
 use std::time::{Duration, Instant};
 
-/// Less processor time than this part of the time that passes is that of threads that only look around.
+/// Less processor time than this part of the time that passes is that of threads that only look around. By
+/// experience: a computation takes all of one processor, or nearly so, wherever it gets one.
 const LEAST_SHARE: f64 = 0.05;
 
 /// What is seen of the work at a moment.

@@ -24,7 +24,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// So many deaths are no accident.
+/// So many deaths are no accident. One may be the fault of whatever else ran; each more costs all other inputs a start.
 pub const MOST_DEATHS: u32 = 2;
 
 /// How the names of marks begin.

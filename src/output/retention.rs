@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 use walkdir::{DirEntry, FilterEntry, IntoIter, WalkDir};
 
-/// How often the output folder is gone through.
+/// How often the output folder is gone through. Ages are told in days: nobody notices an hour.
 const PERIOD: Duration = Duration::from_secs(3600);
 
-/// So many files and folders at most are looked at in one go.
+/// So many files and folders at most are looked at in one go: the daemon's own thread does it, and hears nothing meanwhile.
 const STEP: usize = 500;
 
 type Walk = FilterEntry<IntoIter, fn(&DirEntry) -> bool>;

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where the system does not tell.
+/// Where the system does not tell: that of a small machine. More than there is would end processes, less makes inputs wait.
 const UNKNOWN: u64 = 2 << 30;
 
 /// Where the system shows control groups.

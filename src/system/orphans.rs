@@ -16,7 +16,8 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-/// How long a command may take to end when it is asked to (SIGTERM), before it is killed.
+/// How long a command may take to end when it is asked to (SIGTERM), before it is killed. By experience: enough to remove what
+/// it has begun; more holds up the end and the start of planish.
 pub const GRACE: Duration = Duration::from_secs(2);
 
 /// The variable with the staging folder.

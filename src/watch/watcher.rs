@@ -24,7 +24,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 use walkdir::{DirEntry, WalkDir};
 
-/// The folder is scanned this often, hints or not.
+/// The folder is scanned this often, hints or not, as hints are lost. By experience: each scan asks for every file, and who has
+/// lost one waits no longer than that.
 const SCAN: Duration = Duration::from_secs(5);
 
 /// And this often where there are no hints.

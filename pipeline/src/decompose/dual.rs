@@ -75,20 +75,23 @@ impl<'a> Dual<'a> {
     }
 
     fn find_coincident_faces(&self) -> BTreeMap<HalfEdgeId, Vec<FaceId>> {
-        let place = |h: HalfEdgeId| {
-            let [a, b] = [self.from(h), self.to(h)].map(|v| self.mesh.welded_vertex(VertexId::at(v)));
-            (a.min(b), a.max(b))
-        };
-        let open = self.half_edges().filter(|h| self.twin(*h).is_none());
-        let mut open: Vec<_> = open.map(|h| (place(h), h)).collect();
+        let mut open: Vec<([u32; 2], HalfEdgeId)> = Vec::new();
+        for h in self.half_edges().filter(|h| self.twin(*h).is_none()) {
+            // Sheets that repair took apart have vertices of their own, and may run either way along the edge.
+            let mut ends = [self.from(h), self.to(h)].map(|v| self.mesh.welded_vertex(VertexId::at(v)));
+            ends.sort_unstable();
+            open.push((ends, h));
+        }
         open.sort_unstable();
-        // Open half-edges between the same two welded vertices lie at one place.
-        let at_one_place = open.chunk_by(|g, h| g.0 == h.0).filter(|all| all.len() > 1);
-        let others = |all: &[(_, HalfEdgeId)], h: HalfEdgeId| {
-            let others = all.iter().map(|g| g.1).filter(|g| *g != h);
-            (h, others.map(HalfEdgeId::face).collect())
-        };
-        at_one_place.flat_map(|all| all.iter().map(|h| others(all, h.1))).collect()
+        // Open half-edges between the same two welded vertices lie at one place; most are alone there.
+        let mut coincident = BTreeMap::new();
+        for at_one_place in open.chunk_by(|g, h| g.0 == h.0).filter(|all| all.len() > 1) {
+            for (_, h) in at_one_place {
+                let others = at_one_place.iter().filter(|(_, g)| g != h);
+                coincident.insert(*h, others.map(|(_, g)| g.face()).collect());
+            }
+        }
+        coincident
     }
 
     /// The triangles that lie beyond `h` without being joined to it.

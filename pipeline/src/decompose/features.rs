@@ -17,7 +17,8 @@ use crate::topology::union_find::UnionFind;
 use crate::topology::{FaceId, HalfEdgeId};
 use crate::vec3::{Vec3, dot, norm};
 
-/// The lower threshold, as a share of the upper one: 25 of 40 degrees.
+/// The lower threshold, as a share of the upper one: 25 of 40 degrees. A crease that is less sharp in places stays whole. By
+/// experience: higher leaves gaps in creases, lower joins noise to them.
 const LOWER: f64 = 0.625;
 
 /// The triangles that make up a side of an edge, by experience: fewer follow the normals of single slivers, more reach
@@ -38,10 +39,11 @@ pub(super) fn min_outline(dual: &Dual) -> f64 {
 }
 
 /// A patch that is narrower than this, likewise, is a bevel, and no face, if the features around it are blunt on average:
-/// what follows would have to resolve it.
+/// what follows would have to resolve it. By experience: in the tests a bevel of 0.14 is a face and one of 0.003 is none.
 const MIN_WIDTH: f64 = 0.005;
 
-/// Below this sharpness features are blunt: 60 degrees.
+/// Below this sharpness features are blunt: 60 degrees. A bevel turns a right angle into two of 45 degrees, while the edges
+/// of a groove or of a thin wall, at 90, are not blunt.
 const BLUNT: f64 = 0.5;
 
 /// The dual graph of a surface with its feature edges marked, and their number.

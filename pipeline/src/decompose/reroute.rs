@@ -52,15 +52,21 @@ impl Network<'_> {
     }
 
     fn relabel(&mut self, face: FaceId, label: u32) -> u32 {
+        // An inner vertex counts for the label of one of its triangles: it changes sides with that, and with no other.
         let vertices = self.dual.mesh.triangles()[face.index()].map(|v| v.index());
-        let owned = vertices.into_iter().filter(|v| self.out[*v].face() == face).collect::<Vec<_>>();
-        owned.iter().for_each(|v| self.count_inside(*v, -1));
+        let owned: Vec<usize> = vertices.into_iter().filter(|v| self.out[*v].face() == face).collect();
+        for v in &owned {
+            self.count_inside(*v, -1);
+        }
         let old = std::mem::replace(&mut self.labels[face.index()], label);
-        owned.iter().for_each(|v| self.count_inside(*v, 1));
+        for v in &owned {
+            self.count_inside(*v, 1);
+        }
         self.sizes[old as usize] -= 1;
         self.sizes[label as usize] += 1;
-        self.areas[old as usize] -= self.dual.area(face.index());
-        self.areas[label as usize] += self.dual.area(face.index());
+        let area = self.dual.area(face.index());
+        self.areas[old as usize] -= area;
+        self.areas[label as usize] += area;
         old
     }
 

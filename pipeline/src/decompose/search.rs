@@ -12,7 +12,14 @@ use super::regions::{Region, Regions};
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use crate::monitor::{Checkpoint, Interrupted};
 
+/// By experience. More roundness makes charts compact, more spread keeps them to one face of the shape, and both are paid
+/// for by the area ratio. Half and twice as much of either gave the same number of charts on 15 or 16 of 18 meshes of up to
+/// 19,000 triangles, but cad_imu fell into 150 to 166 charts instead of 142. Seams became 1.4 to 2.4 times as long on
+/// gebco_seabed and retinal_miq, and 6 to 26 % shorter on max_planck and punctured_torus.
 const BALANCED: Weights = Weights { ratio: 1.0, roundness: 0.6, spread: 0.5, shared: 0.0 };
+
+/// The same, where outlines that vanish count and the area ratio counts half: regions that lie deep in each other unite
+/// early.
 const COMPACT: Weights = Weights { ratio: 0.5, roundness: 0.6, spread: 0.5, shared: 1.0 };
 
 /// A strategy of growing charts.
@@ -42,7 +49,7 @@ const STRATEGIES: [Strategy; 9] = [
 ];
 
 /// What seams as long as the square root of the area count, against a decade of the worst area ratio. (They will be a
-/// third shorter when they are straight.)
+/// third shorter when they are straight.) By experience; it only decides among strategies with the same number of charts.
 const SEAMS: f64 = 0.65;
 
 /// The surface as the search sees it.
@@ -55,7 +62,8 @@ pub(super) struct Search<'a> {
     pub checkpoint: &'a Checkpoint<'a>,
 }
 
-/// A component is left whole up to this share of the largest area ratio: it has no seams that would change it.
+/// A component is left whole up to this share of the largest area ratio: it has no seams that would change it. The factor of
+/// two that is left is for the error of the prediction. That may be larger, up to ten in the tests: then it is split later.
 const WHOLE: f64 = 0.5;
 
 /// What became of a component by one of the strategies; less is better.

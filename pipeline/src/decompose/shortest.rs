@@ -7,7 +7,9 @@ use crate::topology::HalfEdgeId;
 use crate::topology::dijkstra::{Settled, ShortestPaths};
 use crate::vec3::distance;
 
-/// An edge along a feature is as long as this share of it.
+/// An edge along a feature is as long as this share of it: seams go four times as far to run along features. Half and twice
+/// as much gave the same number of charts on 15 of 18 meshes; cad_box_multi fell into 143 and 161 instead of 135, but cad_imu
+/// into 121 and 128 instead of 142.
 const FEATURE: f64 = 0.25;
 
 /// The length of an edge as far as paths are concerned.

@@ -204,11 +204,16 @@ fn bisected(dual: &Dual, cells: Cells, limits: &Limits) -> Result<Vec<u32>, Inte
 /// Per cell, whether it may be a chart. A safe point.
 pub(super) fn legal(dual: &Dual, complex: &Complex, limits: &Limits) -> Result<Vec<bool>, Interrupted> {
     dual.checkpoint()?;
-    let count = complex.cells.len();
-    let mut regions = Regions::new(complex, (0..count as u32).collect(), count);
-    let outlines: Vec<_> = (0..count as u32).map(|r| regions.outline_of(r)).collect();
-    let shapes = regions.all.iter().zip(&outlines).map(|(region, outline)| regions.shape(region, outline));
-    Ok(shapes.map(|shape| limits.allow(&shape)).collect())
+    // Every cell as a region of its own.
+    let count = complex.cells.len() as u32;
+    let mut regions = Regions::new(complex, (0..count).collect(), complex.cells.len());
+    let mut legal = Vec::with_capacity(complex.cells.len());
+    for cell in 0..count {
+        let outline = regions.outline_of(cell);
+        let shape = regions.shape(&regions.all[cell as usize], &outline);
+        legal.push(limits.allow(&shape));
+    }
+    Ok(legal)
 }
 
 /// The best legal cut along a level of the area scale.

@@ -14,7 +14,8 @@ use crate::topology::HalfEdgeId;
 use crate::topology::dijkstra::ShortestPaths;
 use std::collections::BTreeSet;
 
-/// Rounds over all seams and corners, and the share of the length that makes another one worth while.
+/// Rounds over all seams and corners, and the share of the length that makes another one worth while. By experience: the
+/// wider bands that follow are more rounds.
 const ROUNDS: usize = 2;
 const MIN_GAIN: f64 = 5e-3;
 
@@ -161,6 +162,7 @@ impl<'n, 'a> Straightening<'n, 'a> {
             if self.vain.contains(&tried) {
                 continue;
             }
+            // Thirds, four times around: the shortest path that replaces more than half of a loop may go round the other way.
             let shorter = if closed { self.shorten_loop(path, 3, 12)? } else { self.shorten_all(path)? };
             if !shorter {
                 self.vain.insert(tried);
@@ -264,25 +266,35 @@ impl<'n, 'a> Straightening<'n, 'a> {
 
     /// Moves a corner of three seams to where they are shortest; whether there was such a place.
     fn move_corner(&mut self, corner: usize, arms: &[Vec<HalfEdgeId>]) -> Result<bool, Interrupted> {
-        let starts: Vec<HalfEdgeId> = arms.iter().map(|a| a[0]).collect();
-        let ends: Vec<usize> = arms.iter().map(|a| self.dual.to(a[a.len() - 1])).collect();
-        let labels: Vec<u32> = starts.iter().map(|h| self.network.label(*h)).collect();
-        let distinct = |v: &[u32]| v[0] != v[1] && v[1] != v[2] && v[2] != v[0];
-        if !distinct(&labels) || ends.contains(&corner) {
+        let ends: Vec<usize> = arms.iter().map(|arm| self.dual.to(arm[arm.len() - 1])).collect();
+        // Each of three charts lies on the left of one arm.
+        let labels: Vec<u32> = arms.iter().map(|arm| self.network.label(arm[0])).collect();
+        let are_distinct = labels[0] != labels[1] && labels[1] != labels[2] && labels[2] != labels[0];
+        // An arm that ends in the corner itself is a loop: it has no end to hold it.
+        if !are_distinct || ends.contains(&corner) {
             return Ok(false);
         }
-        let before: f64 = arms.iter().map(|a| length(self.dual, a)).sum();
-        let sides: Vec<_> = starts
-            .iter()
-            .filter_map(|h| Some((self.network.label(*h), self.network.label(self.dual.twin(*h)?))))
-            .collect();
-        arms.iter().for_each(|a| self.network.remove_seam(a));
+        let before: f64 = arms.iter().map(|arm| length(self.dual, arm)).sum();
+        // Per arm the charts on its left and on its right: the new way will have the same ones.
+        let mut sides: Vec<(u32, u32)> = Vec::with_capacity(arms.len());
+        for arm in arms {
+            let Some(twin) = self.dual.twin(arm[0]) else { continue };
+            sides.push((self.network.label(arm[0]), self.network.label(twin)));
+        }
+        // Out of the way: new ways may run where the old ones did.
+        for arm in arms {
+            self.network.remove_seam(arm);
+        }
         let Some(ways) = self.meeting(&ends, &labels, before)? else {
-            arms.iter().for_each(|a| self.network.restore_seam(a));
+            for arm in arms {
+                self.network.restore_seam(arm);
+            }
             return Ok(false);
         };
-        let path = |(half_edges, (left, right))| Path { half_edges, left, right };
-        let paths: Vec<Path> = ways.into_iter().zip(sides).map(path).collect();
+        let mut paths = Vec::with_capacity(ways.len());
+        for (half_edges, (left, right)) in ways.into_iter().zip(sides) {
+            paths.push(Path { half_edges, left, right });
+        }
         Ok(self.network.reroute(&arms.concat(), &paths, &labels))
     }
 
@@ -297,11 +309,15 @@ impl<'n, 'a> Straightening<'n, 'a> {
         let [first, second, third] = &mut self.trees;
         let meeting =
             |a, b| Bounds { goal: Goal::Meeting([a, b]), labels, length, band: &self.band, barred: self.barred };
+        // Each tree knows the distances that those before it have found, and so looks at less.
         first.grow(self.network, ends[0], &meeting((ends[1], None), (ends[2], None)))?;
         second.grow(self.network, ends[1], &meeting((ends[0], Some(first)), (ends[2], None)))?;
         third.grow(self.network, ends[2], &meeting((ends[0], Some(first)), (ends[1], Some(second))))?;
-        let sum = |v: usize| Some(self.trees[0].distance(v)? + self.trees[1].distance(v)? + self.trees[2].distance(v)?);
-        let known = self.trees[2].settled.iter().filter(|v| !ends.contains(v)).filter_map(|v| Some((sum(*v)?, *v)));
+        let [first, second, third] = &self.trees;
+        let sum = |v: usize| Some(first.distance(v)? + second.distance(v)? + third.distance(v)?);
+        // A corner at an end would leave one of the seams without an edge.
+        let inner = third.settled.iter().copied().filter(|v| !ends.contains(v));
+        let known = inner.filter_map(|v| Some((sum(v)?, v)));
         let nearest = known.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let Some((least, vertex)) = nearest else { return Ok(None) };
         let paths = self.trees.iter().filter_map(|tree| tree.path(self.dual, vertex));

@@ -6,10 +6,12 @@
 
 use crate::vec3::{Vec3, distance, triangle_area};
 
-/// The slack that every triangle inequality gets, relative to the mean edge length.
+/// The slack that every triangle inequality gets, relative to the mean edge length. A flat triangle as long as that gets a
+/// height of the order of its root, 1e-4: far above rounding, and too little to be felt by triangles that are sound.
 const SLACK: f64 = 1e-8;
 
-/// A triangle whose mollified and true areas differ by more than this share is flagged.
+/// A triangle whose mollified and true areas differ by more than this share is flagged: what depends on its area would be
+/// wrong by as much.
 const FLAG: f64 = 0.01;
 
 /// A triangle by its edge lengths: edge 0 joins corners 0 and 1, edge 1 corners 1 and 2, edge 2 corners 2 and 0.

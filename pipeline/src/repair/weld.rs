@@ -5,7 +5,8 @@ use crate::mesh::TriangleSoup;
 use crate::topology::VertexId;
 use crate::vec3::{Vec3, bits_of};
 
-/// Places of the table that are looked at per point, on average and at most.
+/// Places of the table that are looked at per point, on average and at most. Where numbers scatter, 2.5 are needed for a new
+/// point and 1.5 for a known one, as the table is at most half full (Knuth, theorem K): more than three times that is a crowd.
 const LOOKS: usize = 8;
 
 /// In tables: no point.

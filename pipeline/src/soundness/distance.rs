@@ -5,7 +5,8 @@ use crate::evaluate::{Bvh, nearest};
 use crate::topology::VertexId;
 use crate::vec3::Vec3;
 
-/// So many points of the surface are compared with the mesh at most.
+/// So many points of the surface are compared with the mesh at most. By experience: they lie about a hundredth of
+/// the size of the surface (the root of its area) apart; more find smaller losses, and take longer.
 const SAMPLES: f64 = 15_000.0;
 
 /// A distance and where it was found.

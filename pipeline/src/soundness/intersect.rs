@@ -11,7 +11,8 @@ use crate::evaluate::{Bvh, box_around, larger, on_triangle};
 use crate::seams::segment_distance;
 use crate::vec3::{BoundingBox, Vec3, cross, dot, sub};
 
-/// The error of the volume of six doubles, relative to the sum of the absolute values of its terms.
+/// The error of the volume of a tetrahedron, relative to the sum of the absolute values of its terms: (7 + 56 e) e with
+/// e = 2^-53, rounded up (Shewchuk, as above).
 const ROUNDING: f64 = 8e-16;
 
 /// So many pairs of triangles of the surface are looked at in all. Where a mesh crosses itself more often than that lets be

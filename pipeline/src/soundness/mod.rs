@@ -39,16 +39,19 @@ use distance::{SurfaceDistance, uncovered};
 /// 0.8 (a tip of an equilateral element) at most; the nostril of a scanned face was cut off at 1.4.
 const LOST: f64 = 1.2;
 
-/// The area of a mesh relative to that of the surface: flat elements cut bulges off, and bridge dents.
+/// The area of a mesh relative to that of the surface: flat elements cut bulges off, and bridge dents. A sound mesh of
+/// bump_10k has 0.985; one of half a cylinder whose elements lay on each other had 1.011.
 const AREA: [f64; 2] = [0.95, 1.005];
 
-/// The same for a chart of more than [`LARGE`] squares of the size.
+/// The same for a chart of more than [`LARGE`] squares of the size. Wider by experience: what one chart loses of a bulge no
+/// other one makes up for.
 const CHART_AREA: [f64; 2] = [0.85, 1.02];
 
-/// Smaller charts have too few elements for their areas to tell.
+/// Smaller charts have too few elements for their areas to tell: 46 of the size, at 0.43 of its square each. By experience.
 const LARGE: f64 = 20.0;
 
-/// Nodes lie on a curve if they are nearer than this, relative to the diagonal.
+/// Nodes lie on a curve if they are nearer than this, relative to the diagonal. By experience: far above the rounding of
+/// doubles, far below any edge.
 const ON_CURVE: f64 = 1e-9;
 
 /// What a mesh is asked for.

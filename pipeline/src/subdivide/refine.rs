@@ -24,7 +24,8 @@ use crate::mesh::SurfaceMesh;
 use crate::topology::{ChartId, FaceId, HalfEdgeId};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How often the four parts of a triangle may be split again.
+/// How often the four parts of a triangle may be split again. By experience: an edge is then of 512 parts, and a map that
+/// needs more had better be replaced by a plainer one.
 pub(super) const DEPTH: u32 = 8;
 
 /// Barycentric coordinates are multiples of 2^-`BITS`: every node down to the halves of the deepest parts.
@@ -131,11 +132,17 @@ impl<'a> Refiner<'a> {
         let (chart, local) = self.owner[face as usize];
         let cell = self.maps[chart as usize].cells[local as usize];
         let nodes = &self.linear[chart as usize].nodes;
-        let (one, half) = (1 << BITS, 1 << (BITS - 1));
+        // Nodes by their numbers in the atlas, not in the chart: both charts at a seam halve the same edges.
         let corner = |k: usize, at: [i64; 3]| Corner { node: nodes[cell[k] as usize], at };
-        let [a, b, c] = [corner(0, [one, 0, 0]), corner(1, [0, one, 0]), corner(2, [0, 0, one])];
-        let [ab, bc, ca] = [corner(3, [half, half, 0]), corner(4, [0, half, half]), corner(5, [half, 0, half])];
-        [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        let one = 1 << BITS;
+        let a = corner(0, [one, 0, 0]);
+        let b = corner(1, [0, one, 0]);
+        let c = corner(2, [0, 0, one]);
+        let half = one / 2;
+        let ab = corner(3, [half, half, 0]);
+        let bc = corner(4, [0, half, half]);
+        let ca = corner(5, [half, 0, half]);
+        four_parts([a, b, c], [ab, bc, ca])
     }
 
     /// Splits a part, and its parts in turn, as far as it must be. At most [`DEPTH`] deep. Charts that failed rest.
@@ -195,17 +202,22 @@ impl<'a> Refiner<'a> {
     /// The four parts of a part of which all sides are halved; none where they are not.
     fn red(&self, part: &Part) -> Vec<Part> {
         let [Some(ab), Some(bc), Some(ca)] = self.middles(part) else { return vec![] };
-        let [a, b, c] = *part;
-        vec![[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        four_parts(*part, [ab, bc, ca]).to_vec()
     }
 
     /// Queues the other triangles at the edge that the part of an edge from `a` to `b` belongs to.
     fn wake(&mut self, face: u32, a: Corner, b: Corner) {
+        // Both lie on the side across from a corner of which neither has a share; else the part lies inside the triangle.
         let Some(opposite) = (0..3).find(|i| a.at[*i] == 0 && b.at[*i] == 0) else { return };
         let h = HalfEdgeId::side_of(FaceId(face), (opposite + 1) % 3);
-        match self.around.get(&self.nodes.at_middle(self.mesh, h)) {
+        let middle = self.nodes.at_middle(self.mesh, h);
+        match self.around.get(&middle) {
+            // At a seam there may be more than two sheets.
             Some(faces) => self.queue.extend(faces.iter().filter(|f| **f != face)),
-            None => self.queue.extend(self.mesh.edges().twin(h).map(|t| t.face().0)),
+            None => {
+                let beyond = self.mesh.edges().twin(h);
+                self.queue.extend(beyond.map(|twin| twin.face().0));
+            }
         }
     }
 
@@ -268,6 +280,11 @@ impl<'a> Refiner<'a> {
             _ => self.red(part).iter().flat_map(|q| self.leaves(q)).collect(),
         }
     }
+}
+
+/// The parts of a triangle with these corners and middles of the sides 01, 12, 20: those at the corners, then the inner one.
+fn four_parts([a, b, c]: Part, [ab, bc, ca]: [Corner; 3]) -> [Part; 4] {
+    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
 }
 
 /// The uv of the point with barycentric coordinates `at` (in units of 2^-`BITS`) of a curved triangle: exact,

@@ -70,10 +70,15 @@ struct Weights {
 
 /// The weights by the objective at `x`.
 fn weights<O: Objective>(chart: &FilledChart, objective: &O, x: &[[f64; 2]]) -> Weights {
-    let value = |f: usize| objective.value(FaceId::at(f), &chart.nodes(f).map(|n| x[n]));
-    let values: Vec<f64> = (0..chart.triangles().len()).map(value).collect();
+    let mut values = Vec::with_capacity(chart.triangles().len());
+    for f in 0..chart.triangles().len() {
+        let nodes = chart.nodes(f).map(|n| x[n]);
+        values.push(objective.value(FaceId::at(f), &nodes));
+    }
+    // Per triangle with a penalty: fans add to the objective, and have none.
     let mean = values.iter().sum::<f64>() / chart.chart_triangles() as f64;
-    let of_faces = values.into_iter().map(|v| v.max(MIN_WEIGHT * mean)).collect();
+    let least = MIN_WEIGHT * mean;
+    let of_faces = values.into_iter().map(|value| value.max(least)).collect();
     Weights { of_faces, mean }
 }
 

@@ -10,7 +10,8 @@ use crate::monitor::Interrupted;
 /// where the barrier is so steep that the next ones are short.
 const SAFE: f64 = 0.95;
 
-/// The share of the predicted decrease that a step must bring (Armijo).
+/// The share of the predicted decrease that a step must bring (Armijo), as is usual (Nocedal and Wright 2006, *Numerical
+/// Optimization*, section 3.1): it refuses steps that bring next to nothing, and no others.
 const DECREASE: f64 = 1e-4;
 
 /// How often a step is halved at most: to 1e-9 of it, where rounding hides what it brings.

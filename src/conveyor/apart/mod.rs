@@ -34,10 +34,12 @@ use std::thread::{Builder, Scope};
 use std::time::{Duration, Instant};
 use tracing::level_filters::LevelFilter;
 
-/// How often a child is looked at: whether it is wanted, and in time.
+/// How often a child is looked at: whether it is wanted, and in time. By experience: an end that comes so much later is
+/// not noticed; looks that are more frequent take processor time.
 const POLL: Duration = Duration::from_millis(20);
 
-/// How long a child may take to end when it has said that its job has ended.
+/// How long a child may take to end when it has said that its job has ended. It has only its memory to give back; one
+/// that stays holds a place for nothing.
 const LINGERING: Duration = Duration::from_secs(5);
 
 /// Lines of standard error that are kept as evidence, and how long each may be, in bytes.

@@ -33,7 +33,8 @@ const SOON: Duration = Duration::from_secs(1);
 /// neither size nor times.
 const DOUBT: Duration = Duration::from_secs(30);
 
-/// An input that is not done after this is worth a warning.
+/// An input that is not done after this is worth a warning. By experience: the largest ones may take longer, and a warning does
+/// them no harm.
 const LONG: Duration = Duration::from_secs(600);
 
 /// So many results at most are looked for whenever the inbox is looked at: each takes a call of the system, on a disk that

@@ -160,11 +160,13 @@ impl Stretch {
         let [p, q] = sides_at_first(from);
         let [u, v] = sides_at_first(to);
         let doubled_area = p[0] * q[1] - p[1] * q[0];
-        // The columns of the matrix that carries p to u and q to v.
+        // The columns of the matrix that carries p to u and q to v: [u v] times the inverse of [p q].
         let x = [0, 1].map(|k| (u[k] * q[1] - v[k] * p[1]) / doubled_area);
         let y = [0, 1].map(|k| (v[k] * p[0] - u[k] * q[0]) / doubled_area);
         let det = x[0] * y[1] - x[1] * y[0];
-        Self { conformal: bounded(singular_ratio(x, y, det)).max(1.0), area: bounded(det) }
+        // No number comes out for a triangle without area: it counts as the worst.
+        let conformal = bounded(singular_ratio(x, y, det));
+        Self { conformal: conformal.max(1.0), area: bounded(det) }
     }
 }
 
