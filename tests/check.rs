@@ -87,7 +87,8 @@ fn a_moved_point_of_a_hole_or_a_crack_is_found_behind_new_checksums() {
     report.charts[0].certificate.hole_centres[1] = [0.9, 0.0];
     std::fs::write(out.of(name).join("report.json"), report.to_json().expect("JSON")).expect("written");
     let ended = check(&out, name);
-    assert!(ended.code == Some(1) && ended.err.contains("star-shaped"), "{}", ended.err);
+    // The map is one-to-one all the same, by its simple loops: but that is not what was certified.
+    assert!(ended.code == Some(1) && ended.err.contains("something else than the proof"), "{}", ended.err);
 
     let out = certified(name);
     let crack = |piece: &mut UnstructuredGridPiece| {

@@ -5,7 +5,7 @@ use super::{
     Surface, Untangle,
 };
 use planish_core::atlas::Chart;
-use planish_core::certify::{CertifiedMap, PlanarMap};
+use planish_core::certify::{BoundaryArgument, CertifiedMap, PlanarMap};
 use planish_core::map::linear;
 use planish_core::repair::{self, Repaired};
 use planish_core::seams::{Curve, SeamNetwork};
@@ -154,9 +154,9 @@ pub fn certificate(map: &CertifiedMap) -> Certificate {
         depth: proof.depth,
         det_lower_bound: proof.det_lower_bound,
         boundary: Boundary {
-            argument: "star_shaped".to_owned(),
+            argument: boundary_argument(proof.boundary).to_owned(),
             outer_arcs: proof.outer_arcs,
-            holes: proof.hole_centres.len(),
+            holes: proof.holes,
         },
         hole_centres: proof.hole_centres.iter().map(|c| c.uv()).collect(),
         checksum: chart_checksum(map.map()),
@@ -180,6 +180,13 @@ fn untangling(report: &untangle::Report, det_min: f64) -> Untangle {
         energy_excess: (report.energy - report.energy_unconstrained) / report.energy_unconstrained,
         gradient_norm: report.gradient_norm,
         det_min,
+    }
+}
+
+fn boundary_argument(argument: BoundaryArgument) -> &'static str {
+    match argument {
+        BoundaryArgument::StarShaped => "star_shaped",
+        BoundaryArgument::Simple => "simple",
     }
 }
 

@@ -337,9 +337,9 @@ pub struct Certificate {
     pub depth: u32,
     /// Lower bound of the jacobian determinant on the reference triangle.
     pub det_lower_bound: f64,
-    /// How the boundary was proven: arcs of the outer loop and of each hole, all star-shaped.
+    /// How the boundary was proven.
     pub boundary: Boundary,
-    /// A point in each hole from which its loop can be seen.
+    /// A point in each hole from which its loop can be seen, where all loops are star-shaped; else none.
     pub hole_centres: Vec<[f64; 2]>,
     /// blake3 over connectivity and uv, see docs/report.md.
     pub checksum: String,
@@ -348,7 +348,8 @@ pub struct Certificate {
 /// The boundary argument of a proof.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Boundary {
-    /// `star_shaped`.
+    /// `star_shaped`: each loop can be seen from a point inside. `simple`: the loops neither cross nor touch, and one turns
+    /// left.
     pub argument: String,
     /// Arcs of the outer loop.
     pub outer_arcs: usize,

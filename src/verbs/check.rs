@@ -240,7 +240,7 @@ fn check_chart(grid: &Grid, index: usize, chart: &ChartReport) -> Result<String,
     if checksum != chart.certificate.checksum {
         return Err(wrong("the map is one-to-one, but not the one that was certified (checksum differs)"));
     }
-    if certificate(&proof) != chart.certificate || chart.loops != 1 + chart.certificate.hole_centres.len() {
+    if certificate(&proof) != chart.certificate || chart.loops != 1 + chart.certificate.boundary.holes {
         return Err(wrong("the map is one-to-one, but the report's certificate says something else than the proof"));
     }
     let c = proof.certificate();
@@ -250,7 +250,7 @@ fn check_chart(grid: &Grid, index: usize, chart: &ChartReport) -> Result<String,
         c.by_bounds,
         c.by_exact,
         c.det_lower_bound,
-        c.hole_centres.len(),
+        c.holes,
         &checksum[..16],
     ))
 }

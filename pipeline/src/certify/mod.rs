@@ -6,18 +6,23 @@
 //! (c) one boundary loop, the outer one, star-shaped about 0 and winding +1: for every arc with Bezier points
 //!     (p0, c, p1) the signs of p0 x c, p0 x p1 and c x p1 are positive;
 //! (d) every other loop, traversed with the chart on its left, star-shaped about a point c_k (the three products,
-//!     relative to c_k, are negative) and winding -1.
+//!     relative to c_k, are negative) and winding -1;
+//! or, in place of (c) and (d),
+//! (e) loops that are simple and disjoint, of which exactly one turns left: the outer one.
 //! Then F is one-to-one onto the region inside the outer loop minus the holes.
 //!
 //! *Why.* Off the image of the boundary the number N(q) of preimages of q equals its winding number W(q) = [q
 //! inside the outer loop] - sum over k of [q inside hole k], as every preimage counts +1. So N <= 1, and holes
 //! neither overlap nor leave the disk. Near any point the map has local degree at least 1; two points with the
-//! same image would give N >= 2 nearby, or N >= 1 > W beside a loop: a contradiction.
+//! same image would give N >= 2 nearby, or N >= 1 > W beside a loop: a contradiction. (c) and (d) are the cheap test; (e)
+//! asks for no shape ([`curves`] has how it is decided): simple loops have winding numbers of +1 and -1 about what they
+//! enclose, and as W = N is nowhere negative, holes lie inside the outer loop, and none inside another.
 //!
 //! Everything is decided on integers, exactly, from the cells and the uv of the nodes alone: [`prove`] knows
 //! nothing of how the map was made. Only it can make a [`CertifiedMap`].
 
 mod arcs;
+mod curves;
 mod incidence;
 pub(crate) mod polygons;
 mod star;
@@ -55,10 +60,23 @@ pub struct Certificate {
     pub depth: u32,
     /// A lower bound of the jacobian determinant (on the reference triangle of area 1/2) over all triangles.
     pub det_lower_bound: f64,
+    /// How the boundary was proven.
+    pub boundary: BoundaryArgument,
     /// Arcs of the outer loop.
     pub outer_arcs: usize,
-    /// For each hole, in the order of the loops, its centre.
+    /// How many other loops there are.
+    pub holes: usize,
+    /// For each hole, in the order of the loops, its centre, where the loops are star-shaped; else none.
     pub hole_centres: Vec<GridPoint>,
+}
+
+/// Why the loops of a boundary are those of a disk with holes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BoundaryArgument {
+    /// Each is star-shaped about a point: premises (c) and (d) of the theorem.
+    StarShaped,
+    /// They are simple, disjoint, and one turns left: premise (e).
+    Simple,
 }
 
 /// A map that is proven to be one-to-one. Made by [`prove`] only.
@@ -105,8 +123,12 @@ impl CertifiedMap {
 /// };
 /// // Vertices lie on multiples of 2^-52, two units of the grid: otherwise midpoints would be rounded.
 /// assert_eq!(refused(&|m| m.nodes[3].x += 1), Error::OffGrid { node: 3 });
-/// // Without the last triangle the origin lies on the boundary, which does not run around it.
-/// assert_eq!(refused(&|m| m.cells.truncate(2)), Error::OuterLoop { count: 0, loops: 1 });
+/// // A second copy of all three, over the first one: each is one-to-one, together they are not.
+/// let doubled = refused(&|m| {
+///     m.nodes.extend(m.nodes.clone());
+///     m.cells.extend(m.cells.clone().iter().map(|cell| cell.map(|node| node + 10)));
+/// });
+/// assert!(matches!(doubled, Error::Boundary { .. }));
 /// // A triangle that is there twice.
 /// let twice = refused(&|m| m.cells.push(m.cells[0]));
 /// assert!(matches!(twice, Error::Incidence(IncidenceError::Edge { from: 0, to: 1, .. })));
@@ -144,21 +166,14 @@ pub enum Error {
         /// All of them.
         all: Vec<FaceId>,
     },
-    /// No loop, or more than one, is an outer one.
-    #[error("{count} of {loops} boundary loops run around the origin star-shaped, winding once; exactly one must")]
-    OuterLoop {
-        /// How many do.
-        count: usize,
-        /// How many loops there are.
-        loops: usize,
-    },
-    /// A loop cannot be seen from any of the given centres.
-    #[error("the hole whose loop begins at node {node} is not star-shaped about any of the {centres} given centres")]
-    Hole {
-        /// The first node of its loop.
+    /// The loops of the boundary are not those of a disk with holes, or it is not decided whether they are: neither
+    /// star-shaped about the origin and the given centres, nor simple, disjoint and one of them turning left.
+    #[error("the boundary is not shown to be that of a disk with holes: {wrong} (its loop begins at node {node})")]
+    Boundary {
+        /// What is wrong. Loops are numbered by their least nodes.
+        wrong: Wrong,
+        /// The first node of the loop.
         node: u32,
-        /// How many centres were given.
-        centres: usize,
     },
 }
 
@@ -199,25 +214,40 @@ pub fn prove(map: PlanarMap) -> Result<CertifiedMap, Error> {
     }
     let mut certificate = prove_triangles(&map)?;
     let arcs: Vec<Vec<Arc>> = loops.iter().map(|l| arcs_of(l, &map.nodes)).collect();
-    // (c) Exactly one loop runs around the origin to the left.
+    let loops_are = star_shaped(&arcs, &map.hole_centres).map_or_else(|| simple(&arcs), Ok);
+    let boundary = loops_are.map_err(|wrong| Error::Boundary { wrong, node: loops[wrong.first_loop()][0][0] })?;
+    certificate.boundary = boundary.argument;
+    certificate.outer_arcs = arcs[boundary.outer].len();
+    certificate.holes = arcs.len() - 1;
+    certificate.hole_centres = boundary.hole_centres;
+    Ok(CertifiedMap { map, certificate })
+}
+
+/// A boundary that is that of a disk with holes.
+struct ProvenBoundary {
+    argument: BoundaryArgument,
+    /// The number of the outer loop.
+    outer: usize,
+    hole_centres: Vec<GridPoint>,
+}
+
+/// Premises (c) and (d), if they hold: exactly one loop runs around the origin to the left, and every other can be seen
+/// from one of the `centres`. (Any will do for any hole: the theorem asks for one, not for a particular one.)
+fn star_shaped(arcs: &[Vec<Arc>], centres: &[GridPoint]) -> Option<ProvenBoundary> {
     let origin = GridPoint::default();
     let around_origin: Vec<usize> = (0..arcs.len()).filter(|i| arcs::winds_once(&arcs[*i], origin, 1)).collect();
-    let [outer] = around_origin[..] else {
-        return Err(Error::OuterLoop { count: around_origin.len(), loops: loops.len() });
-    };
-    certificate.outer_arcs = arcs[outer].len();
-    // (d) Any of the given centres will do for any hole: the theorem asks for one, not for a particular one.
-    for (i, hole) in arcs.iter().enumerate() {
-        if i == outer {
-            continue;
-        }
-        let seen_from = map.hole_centres.iter().find(|c| arcs::winds_once(hole, **c, -1));
-        let Some(centre) = seen_from else {
-            return Err(Error::Hole { node: loops[i][0][0], centres: map.hole_centres.len() });
-        };
-        certificate.hole_centres.push(*centre);
+    let [outer] = around_origin[..] else { return None };
+    let mut hole_centres = Vec::with_capacity(arcs.len() - 1);
+    for hole in (0..arcs.len()).filter(|i| *i != outer) {
+        hole_centres.push(*centres.iter().find(|c| arcs::winds_once(&arcs[hole], **c, -1))?);
     }
-    Ok(CertifiedMap { map, certificate })
+    Some(ProvenBoundary { argument: BoundaryArgument::StarShaped, outer, hole_centres })
+}
+
+/// Premise (e).
+fn simple(arcs: &[Vec<Arc>]) -> Result<ProvenBoundary, Wrong> {
+    let outer = curves::outer_of(arcs)?;
+    Ok(ProvenBoundary { argument: BoundaryArgument::Simple, outer, hole_centres: vec![] })
 }
 
 fn arcs_of(boundary_loop: &[incidence::ArcNodeIds], nodes: &[GridPoint]) -> Vec<Arc> {
@@ -243,7 +273,9 @@ fn prove_triangles(map: &PlanarMap) -> Result<Certificate, Error> {
         by_exact: 0,
         depth: 0,
         det_lower_bound: f64::INFINITY,
+        boundary: BoundaryArgument::Simple,
         outer_arcs: 0,
+        holes: 0,
         hole_centres: vec![],
     };
     let mut invalid = Vec::new();

@@ -9,14 +9,40 @@ use crate::grid::{GridPoint, orientation};
 use crate::vec3::BoundingBox;
 
 /// What is wrong with loops.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Wrong {
     /// Two sides cross or touch, each given by its loop and its position there.
+    #[error("{} and {} cross or touch", Place(&.0[0]), Place(&.0[1]))]
     Crossing([(usize, usize); 2]),
+    /// Two sides that are curved, each given by its loop and its position there, come so close along each other that it is not decided whether they meet.
+    #[error("it is not decided whether {} and {}, which are curved, cross or touch", Place(&.0[0]), Place(&.0[1]))]
+    Undecided([(usize, usize); 2]),
     /// Not exactly one loop turns left; this one is given as evidence.
+    #[error("not exactly one loop turns left (see loop {0})")]
     Outer(usize),
     /// A loop lies outside the outer one, or inside another.
+    #[error("loop {0} lies outside the outer one, or inside another")]
     Nesting(usize),
+}
+
+impl Wrong {
+    /// The loop that is wrong, or the first of two.
+    pub fn first_loop(self) -> usize {
+        match self {
+            Self::Crossing([(number, _), _]) | Self::Undecided([(number, _), _]) => number,
+            Self::Outer(number) | Self::Nesting(number) => number,
+        }
+    }
+}
+
+/// A side, told by its loop and its position there.
+struct Place<'a>(&'a (usize, usize));
+
+impl std::fmt::Display for Place<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self((number, side)) = self;
+        write!(f, "side {side} of loop {number}")
+    }
 }
 
 /// Looks at closed polygons, each with what it bounds on its left.

@@ -40,12 +40,15 @@ fn a_folded_triangle_is_named() {
 }
 
 #[test]
-fn a_hole_must_be_seen_from_its_centre() {
+fn a_hole_that_is_not_seen_from_its_centre_is_proven_by_its_loop() {
     let mut map = ring(12, 0.4, [0.1, 0.05]);
+    let argument = |map: &PlanarMap| prove(map.clone()).map(|proven| proven.certificate().boundary);
+    assert_eq!(argument(&map), Ok(BoundaryArgument::StarShaped));
     map.hole_centres = vec![GridPoint::vertex([0.6, 0.0])];
-    assert!(matches!(prove(map.clone()), Err(Error::Hole { centres: 1, .. })));
+    assert_eq!(argument(&map), Ok(BoundaryArgument::Simple));
     map.hole_centres.clear();
-    assert!(matches!(prove(map), Err(Error::Hole { centres: 0, .. })));
+    let proven = prove(map).expect("its loops are simple");
+    assert_eq!((proven.certificate().holes, proven.certificate().hole_centres.len()), (1, 0));
 }
 
 #[test]
@@ -60,15 +63,33 @@ fn a_map_that_winds_twice_is_refused() {
         twice.cells.push([i, j, i + 1, i + 2, i + 5, i + 4]);
         twice.cells.push([i + 1, j, j + 1, i + 5, j + 4, i + 3]);
     }
-    assert_eq!(prove(twice).map(|_| ()), Err(Error::OuterLoop { count: 0, loops: 2 }));
+    assert!(matches!(prove(twice), Err(Error::Boundary { .. })));
 }
 
 #[test]
-fn an_outer_loop_that_hides_part_of_itself_is_refused() {
-    let mut map = ring(12, 0.2, [0.0, 0.0]);
-    // One outer vertex moves beyond its neighbour's direction.
-    map.nodes[0] = GridPoint::vertex([0.62, 0.62]);
-    assert!(prove(map).is_err());
+fn a_spiral_ramp_of_two_turns_is_refused_and_one_of_less_than_a_turn_is_proven() {
+    // Every jacobian is positive: only the boundary tells that the second turn lies on the first.
+    let ramp = |sectors: u32| {
+        let mut map = ring(8, 0.4, [0.0, 0.0]);
+        map.hole_centres.clear();
+        let once = map.nodes.clone();
+        map.nodes.clear();
+        map.cells.clear();
+        for k in 0..=sectors {
+            map.nodes.extend(&once[6 * (k as usize % 8)..][..6]);
+        }
+        for i in (0..sectors).map(|k| 6 * k) {
+            let j = i + 6;
+            map.cells.push([i, j, i + 1, i + 2, i + 5, i + 4]);
+            map.cells.push([i + 1, j, j + 1, i + 5, j + 4, i + 3]);
+        }
+        map
+    };
+    let proven = prove(ramp(7)).expect("it does not come round");
+    assert_eq!(proven.certificate().boundary, BoundaryArgument::Simple);
+    assert_eq!((proven.certificate().outer_arcs, proven.certificate().holes), (16, 0));
+    assert!(matches!(prove(ramp(8)), Err(Error::Boundary { .. })), "its ends touch");
+    assert!(matches!(prove(ramp(16)), Err(Error::Boundary { .. })));
 }
 
 #[test]

@@ -143,7 +143,9 @@ fn boundary_defect(mesh: &Mesh, chart: ChartId, open: &[[VertexId; 2]], in_plane
     let polygons: Vec<Vec<GridPoint>> = loops.iter().map(|l| l.iter().map(|v| in_plane.at(*v)).collect()).collect();
     let place = |l: usize, i: usize| loops.get(l).and_then(|l| l.get(i)).map_or([f64::NAN; 3], |v| at(*v));
     polygons::check(&polygons).map(|wrong| match wrong {
-        Wrong::Crossing([(l, i), _]) => Defect::BoundaryCrosses { chart, at: place(l, i) },
+        Wrong::Crossing([(l, i), _]) | Wrong::Undecided([(l, i), _]) => {
+            Defect::BoundaryCrosses { chart, at: place(l, i) }
+        }
         Wrong::Outer(l) | Wrong::Nesting(l) => Defect::BoundaryNested { chart, at: place(l, 0) },
     })
 }
