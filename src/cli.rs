@@ -1,6 +1,8 @@
 //! The command line.
 
-use crate::settings::{ExportTarget, FeatureAngle, Inputs, Log, RawSettings, Refused, Settings, SettingsError};
+use crate::settings::{
+    Boundary, ExportTarget, FeatureAngle, Inputs, Log, RawSettings, Refused, Settings, SettingsError,
+};
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -137,6 +139,10 @@ pub struct Making {
     /// Order of the elements: 1 (linear) or 2 (quadratic) [default: 2]
     #[arg(long, value_name = "1|2")]
     pub order: Option<u8>,
+    /// Boundary of charts in the plane: natural, the one that a chart has when it is laid out flat, where that is one-to-one
+    /// and scales areas evenly, else the circle; or the circle for all [default: natural]
+    #[arg(long, value_enum, value_name = "SHAPE")]
+    pub boundary: Option<Boundary>,
     /// Meshers to which results are handed: gmsh writes atlas.msh and remesh.geo [default: gmsh]
     #[arg(long, value_enum, value_name = "MESHER")]
     pub hand_off: Option<ExportTarget>,
@@ -322,6 +328,7 @@ impl Making {
         RawSettings {
             out: self.out.clone(),
             order: self.order,
+            boundary: self.boundary,
             weld: self.reading.weld,
             feature_angle: self.feature_angle,
             strict_disks: self.strict_disks.then_some(true),

@@ -1,5 +1,6 @@
 //! `planish check`: it proves what is right and finds what was tampered with, even behind new checksums.
 
+use crate::boundaries::obj;
 use crate::support::{Ended, Out, fixture, planish};
 use planish::formats::vtu;
 use planish::report::{Output, Report, chart_checksum};
@@ -11,6 +12,13 @@ use vtkio::xml::Compressor;
 fn certified(name: &str) -> Out {
     let out = Out::new();
     assert_eq!(out.run(&[&fixture(name)], &["-q"]).code, Some(0));
+    out
+}
+
+/// A result whose charts are on the disk.
+fn certified_on_disk(name: &str) -> Out {
+    let out = Out::new();
+    assert_eq!(out.run(&[&fixture(name)], &["-q", "--boundary", "circle"]).code, Some(0));
     out
 }
 
@@ -82,7 +90,7 @@ fn a_folded_triangle_is_named_even_behind_new_checksums() {
 #[test]
 fn a_moved_point_of_a_hole_or_a_crack_is_found_behind_new_checksums() {
     let name = "disk_with_holes.stl";
-    let out = certified(name);
+    let out = certified_on_disk(name);
     let mut report = out.report(name);
     report.charts[0].certificate.hole_centres[1] = [0.9, 0.0];
     std::fs::write(out.of(name).join("report.json"), report.to_json().expect("JSON")).expect("written");
@@ -102,6 +110,47 @@ fn a_moved_point_of_a_hole_or_a_crack_is_found_behind_new_checksums() {
     forge_checksums(&out, name);
     let ended = check(&out, name);
     assert!(ended.code == Some(1) && ended.err.contains("oriented surface"), "{}", ended.err);
+}
+
+#[test]
+fn a_boundary_that_covers_itself_is_found_although_every_jacobian_is_positive() {
+    let (name, out) = ("ramp.obj", Out::new());
+    let ramp = obj(&planish_core::shapes::ramp(24, 20));
+    let (ended, report) = out.run_bytes_with(name, &ramp, &["--feature-angle", "off"]);
+    assert_eq!((ended.code, report.charts.len()), (Some(0), 1), "{}", ended.err);
+    assert_eq!(check(&out, name).code, Some(0));
+    // Five sixths of a turn are drawn out to five quarters, or to what is still one turn.
+    for (times, is_proven) in [(1.1, true), (1.5, false)] {
+        let change = |piece: &mut UnstructuredGridPiece| {
+            let IOBuffer::F64(points) = &piece.points else { panic!("doubles") };
+            let drawn_out = |p: &[f64]| {
+                let turn = p[1].atan2(p[0]).rem_euclid(std::f64::consts::TAU);
+                let (sin, cos) = (times * turn).sin_cos();
+                let radius = 0.45 * p[0].hypot(p[1]);
+                GridPoint::vertex([radius * cos, radius * sin]).uv()
+            };
+            let uv: Vec<f64> = points.chunks(3).flat_map(drawn_out).collect();
+            *doubles(&mut piece.data.point, "uv") = uv;
+        };
+        rewrite(&out, name, "surface.vtu", change);
+        forge_checksums(&out, name);
+        let ended = check(&out, name);
+        let is_refused = ended.err.contains("is not shown to be that of a disk with holes");
+        assert!(
+            ended.code == Some(1) && is_refused != is_proven && !ended.err.contains("are invalid"),
+            "{}",
+            ended.err
+        );
+    }
+}
+
+#[test]
+fn another_argument_than_that_of_the_proof_is_found() {
+    let name = "disk_with_holes.stl";
+    let out = certified(name);
+    reword(&out, name, "\"argument\": \"simple\"", "\"argument\": \"star_shaped\"");
+    let ended = check(&out, name);
+    assert!(ended.code == Some(1) && ended.err.contains("something else than the proof"), "{}", ended.err);
 }
 
 /// Changes the report of a result as text.

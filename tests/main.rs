@@ -1,5 +1,6 @@
 //! The tests of the program as a whole: they drive the real binary and look at what it wrote, with the real VTK.
 
+mod boundaries;
 mod check;
 mod check_mesh;
 mod corpus;

@@ -7,6 +7,7 @@ use crate::atlas::Chart;
 use crate::certify::CertifiedMap;
 use crate::fem::sparse;
 use crate::map::linear;
+use crate::map::natural::NoNatural;
 use crate::measure::distortion::{self, CellFields, Summary};
 use crate::mesh::SurfaceMesh;
 use crate::repair::RefusedComponent;
@@ -41,9 +42,23 @@ pub struct CertifiedChart {
     distortion: Summary,
 }
 
+/// Which boundary a map has in the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BoundaryFound {
+    /// That of a conformal map with a free boundary, in chords.
+    Natural,
+    /// The unit circle.
+    Circle {
+        /// Why it is not the natural one, where that was asked for.
+        why_none: Option<NoNatural>,
+    },
+}
+
 /// How a map was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Provenance {
+    /// Its boundary.
+    pub boundary: BoundaryFound,
     /// The linear map.
     pub linear: LinearSummary,
     /// The harmonic map, where it was asked for and could be computed.

@@ -83,5 +83,5 @@ pub use certified::{CertifiedAtlas, CertifiedChart};
 pub use decompose::decompose;
 pub use parametrize::{ChartError, ChartJob, Error, MapError, MappedChart, Plan, parametrize, parametrize_surface};
 pub use repair::repair;
-pub use settings::{ChartSettings, Order, OutOfRange, Settings};
+pub use settings::{BoundaryShape, ChartSettings, Order, OutOfRange, Settings};
 pub use subdivide::subdivide;

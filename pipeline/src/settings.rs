@@ -12,6 +12,17 @@ pub enum Order {
     Quadratic,
 }
 
+/// Which boundary the map of a chart has in the plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum BoundaryShape {
+    /// That of a conformal map with a free boundary, where there is one that is simple and scales areas evenly (see
+    /// [`crate::map::natural`]); else the circle.
+    #[default]
+    Natural,
+    /// The unit circle, by arc length: what the paper does. Corners of the boundary are stretched, and what is long.
+    Circle,
+}
+
 /// What a caller may choose. The default is what is right for nearly every surface.
 ///
 /// ```
@@ -25,6 +36,8 @@ pub enum Order {
 pub struct Settings {
     /// The order of the elements.
     pub order: Order,
+    /// The boundary of charts in the plane.
+    pub boundary: BoundaryShape,
     /// How the surface is repaired.
     pub repair: repair::Settings,
     /// What charts must respect.
@@ -75,7 +88,7 @@ impl Settings {
 
     /// What the maps of charts depend on.
     pub fn of_charts(&self) -> ChartSettings {
-        ChartSettings { order: self.order, decompose: self.decompose }
+        ChartSettings { order: self.order, boundary: self.boundary, decompose: self.decompose }
     }
 }
 
@@ -84,6 +97,8 @@ impl Settings {
 pub struct ChartSettings {
     /// The order of the elements.
     pub order: Order,
+    /// The boundary in the plane.
+    pub boundary: BoundaryShape,
     /// What charts must respect: one that does not is split.
     pub decompose: decompose::Settings,
 }

@@ -80,6 +80,18 @@ pub fn tube(around: u32, rows: u32, height: f64) -> TriangleSoup {
     soup((0..around * (rows + 1)).map(point).collect(), (0..around * rows).flat_map(quad).collect())
 }
 
+/// A ramp around an axis, between the radii 1 and 2: `sectors` of them, `per_turn` to a turn. From one turn on it would
+/// cover itself when laid out flat.
+pub fn ramp(per_turn: u32, sectors: u32) -> TriangleSoup {
+    let point = |k: u32| {
+        let turn = std::f64::consts::TAU * f64::from(k / 2) / f64::from(per_turn);
+        let radius = 1.0 + f64::from(k % 2);
+        [radius * turn.cos(), radius * turn.sin(), 0.05 * turn]
+    };
+    let quad = |i: u32| [[2 * i, 2 * i + 1, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 2]];
+    soup((0..2 * (sectors + 1)).map(point).collect(), (0..sectors).flat_map(quad).collect())
+}
+
 /// A disk that is strongly bent out of the plane over irregular points: z = 2.5 sin(3x+1) cos(4y) + 0.75 sin 9x
 /// sin 7y, times `height`. Its harmonic P2 map has many invalid triangles. `jitter` (0 to 0.5) moves points inside
 /// by that share of the ring distance.
@@ -329,6 +341,7 @@ mod tests {
         check(folding_three(), 1, 1, Some(0), true);
         check(folding_six(), 1, 1, Some(0), true);
         check(bow_tie(), 2, 2, Some(0), true);
+        check(ramp(8, 16), 1, 1, Some(0), true);
         check(moebius(9), 1, 1, None, false);
         check(sliver_strip(12), 1, 1, Some(0), true);
         check(cracked_patch(), 1, 1, Some(0), true);

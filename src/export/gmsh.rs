@@ -4,6 +4,7 @@ use crate::formats::gmsh;
 use crate::report::ExportReport;
 use crate::result_files;
 use planish_core::atlas::Chart;
+use planish_core::certified::BoundaryFound;
 use planish_core::certified::NARROW;
 use planish_core::evaluate::Plane;
 use planish_core::map::natural::{Natural, natural};
@@ -263,7 +264,7 @@ fn are_disjoint(ends: [usize; 2], others: [usize; 2]) -> bool {
 fn algorithms(charts: &[CertifiedChart], linear: &LinearAtlas, distortions: &[Summary], size: f64) -> gmsh::Algorithms {
     let mut adapted = Vec::new();
     for (c, distortion) in distortions.iter().enumerate() {
-        if stretches(charts[c].chart(), linear, distortion, size) && !is_flat(linear, c) {
+        if stretches(&charts[c], linear, distortion, size) && !is_flat(linear, c) {
             adapted.push(c);
         }
     }
@@ -272,13 +273,15 @@ fn algorithms(charts: &[CertifiedChart], linear: &LinearAtlas, distortions: &[Su
 }
 
 /// Whether the map of a chart stretches too much for the other algorithms.
-fn stretches(chart: &Chart, linear: &LinearAtlas, distortion: &Summary, size: f64) -> bool {
+fn stretches(certified: &CertifiedChart, linear: &LinearAtlas, distortion: &Summary, size: f64) -> bool {
+    let chart = certified.chart();
     // What is handed over is the linear map; the distortion is that of the certified one.
     if linear.linear_charts().binary_search(&chart.id()).is_ok() {
         return true;
     }
     let is_quick = area_of(chart) < QUICK * size * size && distortion.area_ratio < EVEN;
-    let is_natural = linear.straight_charts().binary_search(&chart.id()).is_ok();
+    let is_natural = certified.provenance().boundary == BoundaryFound::Natural
+        || linear.straight_charts().binary_search(&chart.id()).is_ok();
     distortion.conformal_p99 > if is_quick && !is_natural { BENT } else { STRETCHED }
 }
 
@@ -341,7 +344,9 @@ fn failure(error: &subdivide::Error, charts: &[CertifiedChart]) -> String {
     let location = match error {
         subdivide::Error::Inverted(inverted) => source(charts, inverted.chart, inverted.face),
         subdivide::Error::NoNormal { chart, face } => source(charts, *chart, *face) + "; use a larger unit of length",
-        subdivide::Error::MeetsItself { .. } | subdivide::Error::Pinched { .. } => String::new(),
+        subdivide::Error::MeetsItself { .. } | subdivide::Error::Pinched { .. } | subdivide::Error::Touches { .. } => {
+            String::new()
+        }
     };
     format!("{error}{location}")
 }

@@ -1,12 +1,15 @@
 //! From the core's numbers to the report's.
 
 use super::{
-    Boundary, Certificate, ChartReport, Counts, Distortion, Linear, Quadratic, RepairedSurface, Repairs, Seam, Seams,
-    Surface, Untangle,
+    Boundary, Certificate, ChartBoundary, ChartReport, Counts, Distortion, Linear, Quadratic, RepairedSurface, Repairs,
+    Seam, Seams, Surface, Untangle,
 };
+use crate::settings;
 use planish_core::atlas::Chart;
+use planish_core::certified::BoundaryFound;
 use planish_core::certify::{BoundaryArgument, CertifiedMap, PlanarMap};
 use planish_core::map::linear;
+use planish_core::map::natural::NoNatural;
 use planish_core::repair::{self, Repaired};
 use planish_core::seams::{Curve, SeamNetwork};
 use planish_core::topology::TopologySummary;
@@ -125,6 +128,7 @@ fn chart(certified: &CertifiedChart, colour: u32, network: &SeamNetwork) -> Char
         colour,
         seams: seams_of(chart, network),
         neighbours: network.neighbours(chart.id()).iter().map(|c| c.0).collect(),
+        boundary: chart_boundary(provenance.boundary),
         linear: Linear {
             folded: provenance.linear.folded,
             edges_changed: provenance.linear.edges_changed,
@@ -183,6 +187,27 @@ fn untangling(report: &untangle::Report, det_min: f64) -> Untangle {
     }
 }
 
+fn chart_boundary(found: BoundaryFound) -> ChartBoundary {
+    let why_none = match found {
+        BoundaryFound::Natural => {
+            return ChartBoundary { shape: settings::Boundary::Natural, reason: None, message: None };
+        }
+        BoundaryFound::Circle { why_none } => why_none,
+    };
+    let code = |why: &NoNatural| match why {
+        NoNatural::Folded { .. } => "folded",
+        NoNatural::Crossing => "crossing",
+        NoNatural::Uneven { .. } => "uneven",
+        NoNatural::Stretched { .. } => "stretched",
+        NoNatural::Unsolvable => "unsolvable",
+    };
+    ChartBoundary {
+        shape: settings::Boundary::Circle,
+        reason: why_none.as_ref().map(|why| code(why).to_owned()),
+        message: why_none.map(|why| why.to_string()),
+    }
+}
+
 fn boundary_argument(argument: BoundaryArgument) -> &'static str {
     match argument {
         BoundaryArgument::StarShaped => "star_shaped",
@@ -195,6 +220,8 @@ fn linear_method(method: linear::Method) -> &'static str {
         linear::Method::Harmonic => "harmonic",
         linear::Method::MMatrix => "m_matrix",
         linear::Method::MeanValue => "mean_value",
+        linear::Method::Conformal => "conformal",
+        linear::Method::Projection => "projection",
     }
 }
 

@@ -82,6 +82,9 @@ pub struct Input {
 pub struct ResultSettings {
     /// Order of the elements.
     pub order: u8,
+    /// Boundary of charts in the plane; results that say nothing have the circle.
+    #[serde(default = "circle")]
+    pub boundary: settings::Boundary,
     /// Tolerance for cracks.
     pub weld: f64,
     /// Dihedral angle of feature edges, in degrees; null: off.
@@ -98,10 +101,15 @@ pub struct ResultSettings {
     pub size: Option<f64>,
 }
 
+fn circle() -> settings::Boundary {
+    settings::Boundary::Circle
+}
+
 impl From<&Settings> for ResultSettings {
     fn from(settings: &Settings) -> Self {
         Self {
             order: if settings.order == Order::Linear { 1 } else { 2 },
+            boundary: settings.boundary,
             weld: settings.weld,
             feature_angle: settings.feature_angle,
             strict_disks: settings.strict_disks,
@@ -118,6 +126,7 @@ impl ResultSettings {
     pub fn applied_to(&self, settings: Settings) -> Settings {
         Settings {
             order: if self.order == 1 { Order::Linear } else { Order::Quadratic },
+            boundary: self.boundary,
             weld: self.weld,
             feature_angle: self.feature_angle,
             strict_disks: self.strict_disks,
@@ -269,6 +278,9 @@ pub struct ChartReport {
     pub seams: Vec<u32>,
     /// Charts beside it.
     pub neighbours: Vec<u32>,
+    /// Its boundary in the plane.
+    #[serde(default)]
+    pub boundary: ChartBoundary,
     /// The linear map.
     pub linear: Linear,
     /// The harmonic quadratic map; null for order 1, or where its system could not be solved.
@@ -281,6 +293,24 @@ pub struct ChartReport {
     pub distortion: Distortion,
 }
 
+/// The boundary of a chart in the plane. Results that say nothing have the circle.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ChartBoundary {
+    /// Which one it is.
+    pub shape: settings::Boundary,
+    /// Why it is the circle although the natural one was asked for: `folded`, `crossing`, `uneven`, `stretched`,
+    /// `unsolvable`; else null.
+    pub reason: Option<String>,
+    /// The same in words.
+    pub message: Option<String>,
+}
+
+impl Default for ChartBoundary {
+    fn default() -> Self {
+        Self { shape: circle(), reason: None, message: None }
+    }
+}
+
 /// The linear map of a chart.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Linear {
@@ -288,7 +318,7 @@ pub struct Linear {
     pub folded: usize,
     /// Edges whose weight was changed.
     pub edges_changed: usize,
-    /// `harmonic`, `m_matrix` or `mean_value`.
+    /// `harmonic`, `m_matrix` or `mean_value`; with a natural boundary `conformal` or `projection`, too.
     pub method: String,
 }
 

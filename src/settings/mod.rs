@@ -15,7 +15,7 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 pub use template::{Part, Placeholder, Template, TemplateError};
-pub use values::{ExportTarget, FeatureAngle, Inputs, Log, Off, RawCommand, RawLimits, Refused};
+pub use values::{Boundary, ExportTarget, FeatureAngle, Inputs, Log, Off, RawCommand, RawLimits, Refused};
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
 /// the file alone.
@@ -26,6 +26,8 @@ pub struct RawSettings {
     pub out: Option<PathBuf>,
     /// Order of the elements: 1 or 2.
     pub order: Option<u8>,
+    /// Boundary of charts in the plane.
+    pub boundary: Option<Boundary>,
     /// Tolerance for cracks, relative to the diagonal of the bounding box.
     pub weld: Option<f64>,
     /// Dihedral angle of feature edges, in degrees, or `off`.
@@ -98,6 +100,8 @@ pub struct Settings {
     pub out: Option<PathBuf>,
     /// Order of the elements.
     pub order: Order,
+    /// Boundary of charts in the plane.
+    pub boundary: Boundary,
     /// Tolerance for cracks, relative to the diagonal of the bounding box.
     pub weld: f64,
     /// Dihedral angle of feature edges, in degrees; none: there are none.
@@ -161,6 +165,7 @@ impl Settings {
     pub fn core(&self) -> planish_core::Settings {
         planish_core::Settings {
             order: self.order,
+            boundary: self.boundary.into(),
             repair: planish_core::repair::Settings { weld: self.weld },
             decompose: planish_core::decompose::Settings {
                 max_area_ratio: self.max_area_ratio,
@@ -292,6 +297,7 @@ impl RawSettings {
         Self {
             out: self.out.or(other.out),
             order: self.order.or(other.order),
+            boundary: self.boundary.or(other.boundary),
             weld: self.weld.or(other.weld),
             feature_angle: self.feature_angle.or(other.feature_angle),
             strict_disks: self.strict_disks.or(other.strict_disks),
@@ -395,6 +401,7 @@ impl RawSettings {
         Ok(Settings {
             out: self.out,
             order,
+            boundary: self.boundary.unwrap_or_default(),
             weld,
             feature_angle,
             strict_disks: self.strict_disks.unwrap_or(core.strict_disks),

@@ -27,6 +27,26 @@ pub enum ExportTarget {
     None,
 }
 
+/// The boundary of charts in the plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Boundary {
+    /// The one that a chart has when it is laid out flat, where that is one-to-one and scales areas evenly; else the circle.
+    #[default]
+    Natural,
+    /// The unit circle.
+    Circle,
+}
+
+impl From<Boundary> for planish_core::BoundaryShape {
+    fn from(boundary: Boundary) -> Self {
+        match boundary {
+            Boundary::Natural => Self::Natural,
+            Boundary::Circle => Self::Circle,
+        }
+    }
+}
+
 /// The dihedral angle of feature edges.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(untagged)]

@@ -127,7 +127,7 @@ fn what_stretches_too_much_is_split_until_it_does_not() {
         let settings = Settings { max_area_ratio, ..smooth() };
         let whole = assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk");
         let chart = whole.into_charts().remove(0);
-        let settings = ChartSettings { order: Order::Quadratic, decompose: settings };
+        let settings = ChartSettings { decompose: settings, ..ChartSettings::default() };
         let parts = ChartJob { chart, settings }.map(&NoMonitor).expect("maps");
         assert!(parts.len() > 2, "{}", parts.len());
         let triangles = parts.iter().map(|p| p.chart().triangles().len());

@@ -6,7 +6,7 @@
 
 use crate::grid::GridPoint;
 use crate::map::filled::FilledChart;
-use crate::topology::HalfEdgeId;
+use crate::topology::{HalfEdgeId, VertexId};
 use std::f64::consts::TAU;
 
 /// The shortest edge, relative to the mean, as far as its arc is concerned. By experience: small enough that shares are
@@ -133,6 +133,15 @@ impl Boundary {
         }
         let vertices = vertices.iter().map(|p| GridPoint::vertex(*p)).collect();
         Ok(Self { vertices, mids: mids.iter().map(|p| GridPoint::mid(*p)).collect() })
+    }
+
+    /// The loops with their vertices where `place` has them, mid-edge nodes in the middle of chords, exactly.
+    pub(crate) fn chords(chart: &FilledChart, place: impl Fn(VertexId) -> GridPoint) -> Self {
+        let ends = || chart.outer().iter().map(|h| chart.ends(*h).map(&place));
+        Self {
+            vertices: ends().map(|[from, _]| from).collect(),
+            mids: ends().map(|[from, to]| from.midpoint(to)).collect(),
+        }
     }
 
     /// The uv of the loop's vertices.

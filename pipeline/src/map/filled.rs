@@ -1,4 +1,4 @@
-//! A chart with its holes filled by virtual fans, and the nodes of its quadratic elements.
+//! A chart with its holes filled by virtual fans, or left open, and the nodes of its quadratic elements.
 //!
 //! Every hole gets a virtual vertex, joined to the loop by isosceles triangles with legs r = max(P / 2 pi,
 //! l_max / sqrt 3) (P the perimeter, l_max the longest edge), so that every triangle inequality holds. The fans
@@ -18,7 +18,7 @@ use crate::topology::{HalfEdgeId, VertexId};
 use crate::vec3::Vec3;
 use std::f64::consts::TAU;
 
-/// A chart whose holes are filled: its own triangles first, then the fans.
+/// A chart whose holes are filled ([`Self::new`]), or left open: its own triangles first, then the fans.
 ///
 /// Vertices: those of the chart, then one centre per hole. Nodes of the quadratic elements: vertices of the chart
 /// `0..V`, mid-edge nodes of the chart `V..N`, centres, mid-edge nodes of the spokes.
@@ -95,6 +95,26 @@ impl FilledChart {
         }
     }
 
+    /// The chart as it is: holes stay open, and what is prescribed is prescribed along all loops, that of the outer one
+    /// first.
+    pub fn open(chart: &Chart) -> Self {
+        let outer: Vec<HalfEdgeId> = chart.outer().iter().chain(chart.holes().iter().flatten()).copied().collect();
+        let chart_vertices = chart.vertices().len();
+        Self {
+            elimination: elimination::of_vertices(chart.triangles(), chart_vertices, &outer),
+            edges: chart.edges().clone(),
+            triangles: chart.triangles().to_vec(),
+            shapes: chart.shapes().to_vec(),
+            chart_triangles: chart.triangles().len(),
+            chart_vertices,
+            chart_edges: chart.edges().len(),
+            holes: 0,
+            outer,
+            loops: vec![],
+            curved: Vec::new(),
+        }
+    }
+
     /// The same with the triangles of the chart curved through six nodes each (as [`P2`] orders them), in the unit of the
     /// shapes: what energies see of the surface. Fans stay flat; the flat shapes of the corners still decide where the
     /// boundary goes, and how the linear map weighs its edges.
@@ -157,12 +177,13 @@ impl FilledChart {
         self.quadratic_nodes().count()
     }
 
-    /// The outer loop, with the chart on its left.
+    /// The half-edges along which the map is prescribed, with the chart on their left: the outer loop, and those of holes
+    /// that are open.
     pub fn outer(&self) -> &[HalfEdgeId] {
         &self.outer
     }
 
-    /// The loops around the holes, with the chart on their left.
+    /// The loops around the holes that are filled, with the chart on their left.
     pub fn loops(&self) -> &[Vec<HalfEdgeId>] {
         &self.loops
     }

@@ -34,9 +34,13 @@ pub enum Method {
     MMatrix,
     /// Mean value weights.
     MeanValue,
+    /// Least squares conformal, with a free boundary.
+    Conformal,
+    /// Projected along the mean of the normals.
+    Projection,
 }
 
-/// A P1 map onto the disk in which no triangle is folded.
+/// A P1 map in which no triangle is folded.
 #[derive(Clone, Debug)]
 pub struct LinearMap {
     uv: Vec<GridPoint>,
@@ -77,6 +81,18 @@ impl From<sparse::Error> for Error {
 }
 
 impl LinearMap {
+    /// The map with the vertices at `uv`, however that was found.
+    ///
+    /// # Errors
+    /// [`Error::Folded`].
+    pub fn through(chart: &FilledChart, uv: Vec<GridPoint>, method: Method) -> Result<Self, Error> {
+        let folds = folded(chart, &uv);
+        match folds.first() {
+            Some(first) => Err(Error::Folded { folded: folds.len(), first: *first }),
+            None => Ok(Self { uv, folded: 0, edges_changed: 0, method }),
+        }
+    }
+
     /// The uv coordinates of the vertices, those of the fans' centres last.
     pub fn uv(&self) -> &[GridPoint] {
         &self.uv

@@ -10,11 +10,12 @@
 
 use super::job::{ChartError, MapError, Maps, map_whole};
 use crate::atlas::Chart;
+use crate::certified::BoundaryFound;
 use crate::decompose;
 use crate::map::natural;
 use crate::measure::distortion;
 use crate::monitor::{Interrupted, Monitor};
-use crate::settings::ChartSettings;
+use crate::settings::{BoundaryShape, ChartSettings};
 
 /// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
 /// of a terrain, at 10 to 50, and soccerball_g31, at 80, are well left whole.
@@ -36,6 +37,18 @@ const FEW: usize = 3;
 /// across its openings, and 37 for four by the inside of imu_adis16480. A ring of fine triangles that falls into more
 /// (bent_disk) had better stay whole.
 const MANY: usize = 20;
+
+/// A ring whose map scales areas by no more than this stays one chart: of a cylinder's wall that is e^(2 L / R), for walls
+/// up to one radius high.
+const SHORT_RING: f64 = 8.0;
+
+/// And if the disk does not stretch it more than this. Rings of 36 facets, five radii high, are stretched by 1.25 in four
+/// rows, by 33 in two, and by 317 in one.
+const ROUND: f64 = 2.0;
+
+/// What is unrolled has no larger conformal distortion, and no larger area ratio: a quarter of a cylinder of eight facets
+/// has neither.
+const UNROLLED: f64 = 1.1;
 
 /// A chart and its map.
 type Mapped = (Chart, Maps);
@@ -70,9 +83,12 @@ impl Cutter<'_> {
     /// # Errors
     /// [`ChartError`].
     pub(super) fn parts(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Mapped>>, ChartError> {
+        if let Some(strips) = self.strips(chart, map)? {
+            return Ok(Some(strips));
+        }
         let on_disk = map.conformal_p99(chart);
         // Only a chart that the disk does not suit is asked for a natural map.
-        if on_disk <= STRETCHED || self.suits(chart, on_disk, STRETCHED)? == Suits::Natural {
+        if on_disk <= STRETCHED || self.suits(chart, map, STRETCHED)? == Suits::Natural {
             return Ok(None);
         }
         let most = chart.holes().len().max(1) * if on_disk > TORN { MANY } else { FEW };
@@ -84,6 +100,48 @@ impl Cutter<'_> {
             }
         }
         Ok(None)
+    }
+
+    /// The two strips into which a ring falls, where both are unrolled without stretching, as the wall of a cylinder is; none
+    /// where natural boundaries were not asked for, or the ring has one that suits it.
+    fn strips(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Mapped>>, ChartError> {
+        let ChartSettings { order, boundary, ref decompose } = *self.settings;
+        if boundary == BoundaryShape::Circle || chart.holes().len() != 1 {
+            return Ok(None);
+        }
+        let is_flat = map.boundary == BoundaryFound::Natural
+            && map.conformal_p99(chart) <= UNROLLED
+            && distortion::area_ratio(chart, &map.certified_start) <= SHORT_RING;
+        if is_flat {
+            return Ok(None);
+        }
+        // Through the hole, as the disk shows it.
+        let disk = match map_whole(chart, order, BoundaryShape::Circle, f64::INFINITY, self.monitor) {
+            Ok(disk) => disk,
+            Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
+            Err(_) => return Ok(None),
+        };
+        let is_short = distortion::area_ratio(chart, &disk.certified_start) <= SHORT_RING;
+        if is_short && disk.conformal_p99(chart) <= ROUND {
+            return Ok(None);
+        }
+        let Some(is_left) = left_of_hole(&disk) else { return Ok(None) };
+        let halves = decompose::halve(chart, &is_left, decompose, self.monitor)?;
+        if halves.len() != 2 {
+            return Ok(None);
+        }
+        let mut strips = Vec::new();
+        for half in halves {
+            let Attempt::Mapped(map) = self.attempt(&half)? else { return Ok(None) };
+            let is_unrolled = map.boundary == BoundaryFound::Natural
+                && map.conformal_p99(&half) <= UNROLLED
+                && distortion::area_ratio(&half, &map.certified_start) <= UNROLLED;
+            if !is_unrolled {
+                return Ok(None);
+            }
+            strips.push((half, *map));
+        }
+        Ok(Some(strips))
     }
 
     /// Parts whose maps stretch less than `bound` or are natural, and how many are natural; none where they are more
@@ -110,7 +168,7 @@ impl Cutter<'_> {
                 // Left to the caller's rule for charts that do not map.
                 Attempt::Single => return Ok(None),
             };
-            let suits = self.suits(&part, map.conformal_p99(&part), bound)?;
+            let suits = self.suits(&part, &map, bound)?;
             let parts = if suits == Suits::Neither { self.halves(&part, &map)? } else { None };
             match parts {
                 // Nothing becomes smaller.
@@ -130,11 +188,11 @@ impl Cutter<'_> {
     /// # Errors
     /// [`ChartError`].
     pub(super) fn attempt(&self, chart: &Chart) -> Result<Attempt, ChartError> {
-        let &Self { settings: &ChartSettings { order, ref decompose }, monitor } = self;
+        let &Self { settings: &ChartSettings { order, boundary, ref decompose }, monitor } = self;
         if let Some(ends) = decompose::contact(chart) {
             return Ok(Attempt::Split(decompose::separate(chart, ends, decompose, monitor)?));
         }
-        let error = match map_whole(chart, order, decompose.max_area_ratio, monitor) {
+        let error = match map_whole(chart, order, boundary, decompose.max_area_ratio, monitor) {
             Ok(map) => return Ok(Attempt::Mapped(Box::new(map))),
             Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
             Err(error) => error,
@@ -143,8 +201,12 @@ impl Cutter<'_> {
         Ok(parts.map_or(Attempt::Single, Attempt::Split))
     }
 
-    /// `on_disk` is how much the map of the chart stretches.
-    fn suits(&self, chart: &Chart, on_disk: f64, bound: f64) -> Result<Suits, Interrupted> {
+    fn suits(&self, chart: &Chart, map: &Maps, bound: f64) -> Result<Suits, Interrupted> {
+        let stretch = map.conformal_p99(chart);
+        if map.boundary == BoundaryFound::Natural {
+            return Ok(if stretch <= bound { Suits::Natural } else { Suits::Neither });
+        }
+        let on_disk = stretch;
         let natural = natural::natural(chart, on_disk, self.monitor)?;
         Ok(if natural.is_some_and(|n| n.distortion.conformal_p99 <= bound) {
             Suits::Natural

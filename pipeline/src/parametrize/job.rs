@@ -2,7 +2,7 @@
 
 use super::cut::{Attempt, Cutter};
 use crate::atlas::Chart;
-use crate::certified::{CertifiedChart, Harmonic, LinearSummary, Provenance};
+use crate::certified::{BoundaryFound, CertifiedChart, Harmonic, LinearSummary, Provenance};
 use crate::certify::{self, CertifiedMap, PlanarMap, prove};
 use crate::decompose;
 use crate::fem::sparse;
@@ -10,10 +10,11 @@ use crate::grid::GridPoint;
 use crate::map::boundary::{Boundary, Mids};
 use crate::map::filled::FilledChart;
 use crate::map::linear::{self, LinearMap, flatten_ear_arcs, linear_map};
+use crate::map::natural::{NaturalStart, NoNatural, natural_start};
 use crate::map::quadratic::{QuadraticMap, min_det, quadratic_map};
 use crate::measure::distortion;
 use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
-use crate::settings::{ChartSettings, Order, OutOfRange};
+use crate::settings::{BoundaryShape, ChartSettings, Order, OutOfRange};
 use crate::untangle::{Dirichlet, Untangled, untangle};
 
 /// A chart that is to be mapped, and what its map depends on: a value of its own, which needs neither the surface nor the
@@ -59,6 +60,7 @@ pub(super) struct Maps {
     start: Vec<GridPoint>,
     pub(super) certified_start: CertifiedMap,
     harmonic: Option<Result<QuadraticMap, sparse::Unsolvable>>,
+    pub(super) boundary: BoundaryFound,
 }
 
 impl Maps {
@@ -67,7 +69,7 @@ impl Maps {
     /// elevated. Noise makes many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
     pub(super) fn conformal_p99(&self, chart: &Chart) -> f64 {
         let nodes = match &self.harmonic {
-            Some(Ok(map)) if !chart.holes().is_empty() => map.nodes(),
+            Some(Ok(map)) if !chart.holes().is_empty() && self.boundary != BoundaryFound::Natural => map.nodes(),
             _ => &self.start,
         };
         distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]))
@@ -139,7 +141,7 @@ impl ChartJob {
                     continue;
                 }
                 // Its map is what it is.
-                Attempt::Single => map_whole(&chart, settings.order, f64::INFINITY, monitor)?,
+                Attempt::Single => map_whole(&chart, settings.order, settings.boundary, f64::INFINITY, monitor)?,
             };
             mapped.push(MappedChart { chart, settings, maps });
         }
@@ -198,12 +200,12 @@ impl MappedChart {
     }
 }
 
-/// Maps, untangles and certifies a chart as it is, however much that distorts it.
+/// Maps, untangles and certifies a chart as it is, with its boundary on the circle, however much that distorts it.
 ///
 /// # Errors
 /// [`MapError`]: the chart must be split, as [`ChartJob::run`] does.
 pub fn parametrize_chart(chart: Chart, order: Order) -> Result<CertifiedChart, MapError> {
-    let maps = map_whole(&chart, order, f64::INFINITY, &NoMonitor)?;
+    let maps = map_whole(&chart, order, BoundaryShape::Circle, f64::INFINITY, &NoMonitor)?;
     let proven = untangle_and_certify(maps, &NoMonitor)?;
     let ratio = distortion::area_ratio(&chart, &proven.map);
     Ok(proven.of(chart, ratio))
@@ -252,11 +254,44 @@ impl From<decompose::Error> for ChartError {
 pub(super) fn map_whole(
     chart: &Chart,
     order: Order,
+    shape: BoundaryShape,
+    max_area_ratio: f64,
+    monitor: &dyn Monitor,
+) -> Result<Maps, MapError> {
+    if shape == BoundaryShape::Circle {
+        return map_to_disk(chart, order, None, max_area_ratio, monitor);
+    }
+    let start = match natural_start(chart, max_area_ratio, monitor)? {
+        Ok(start) => start,
+        Err(why) => return map_to_disk(chart, order, Some(why), max_area_ratio, monitor),
+    };
+    let conformal_p99 = start.conformal_p99;
+    if conformal_p99 > STRETCHED {
+        // The disk may be better, where it has a map at all.
+        match map_to_disk(chart, order, Some(NoNatural::Stretched { conformal_p99 }), max_area_ratio, monitor) {
+            Ok(maps) if maps.conformal_p99(chart) < conformal_p99 => return Ok(maps),
+            Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
+            Ok(_) | Err(_) => {}
+        }
+    }
+    FeasibleStart::natural(start).mapped(order, monitor)
+}
+
+/// Where a natural map stretches a hundredth of the area more than this, that of the disk is looked at, too: rings of
+/// needles in cad_rear_case have natural maps at 1,000 to 90,000, all of whose triangles are invalid. By experience: the
+/// disk stretches less than this only what is round already.
+const STRETCHED: f64 = 5.0;
+
+/// As [`map_whole`], with the boundary on the circle. `why_none` is the reason, where the natural one was asked for.
+fn map_to_disk(
+    chart: &Chart,
+    order: Order,
+    why_none: Option<NoNatural>,
     max_area_ratio: f64,
     monitor: &dyn Monitor,
 ) -> Result<Maps, MapError> {
     let checkpoint = Checkpoint::new(monitor);
-    let start = FeasibleStart::new(chart, order, monitor, &checkpoint)?;
+    let start = FeasibleStart::on_disk(chart, order, why_none, monitor, &checkpoint)?;
     let of_start = distortion::area_ratio(chart, &start.certified);
     if order == Order::Linear {
         start.refuse_above(max_area_ratio, of_start, chart)?;
@@ -264,12 +299,7 @@ pub(super) fn map_whole(
         return Ok(start.with_harmonic(None));
     }
     start.refuse_above(HOPELESS * max_area_ratio, of_start, chart)?;
-    let harmonic = match quadratic_map(&start.filled, &start.boundary, monitor) {
-        Ok(map) => Ok(map),
-        // There is the start.
-        Err(sparse::Error::Unsolvable(unsolvable)) => Err(unsolvable),
-        Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted.into()),
-    };
+    let harmonic = start.harmonic(monitor)?;
     if let Ok(map) = &harmonic {
         let nodes = |f: usize| start.filled.nodes(f).map(|n| map.nodes()[n]);
         let of_harmonic = distortion::area_ratio_of_nodes(chart, nodes);
@@ -288,10 +318,42 @@ struct FeasibleStart {
     linear: LinearMap,
     nodes: Vec<GridPoint>,
     certified: CertifiedMap,
+    found: BoundaryFound,
 }
 
 impl FeasibleStart {
-    fn new(chart: &Chart, order: Order, monitor: &dyn Monitor, checkpoint: &Checkpoint) -> Result<Self, MapError> {
+    fn natural(start: NaturalStart) -> Self {
+        let NaturalStart { filled, boundary, linear, nodes, certified, .. } = start;
+        Self { filled, boundary, linear, nodes, certified, found: BoundaryFound::Natural }
+    }
+
+    /// All maps with this boundary, however they scale areas: that was looked at when it was chosen.
+    fn mapped(self, order: Order, monitor: &dyn Monitor) -> Result<Maps, MapError> {
+        let harmonic = match order {
+            Order::Linear => None,
+            Order::Quadratic => Some(self.harmonic(monitor)?),
+        };
+        Checkpoint::new(monitor).end()?;
+        Ok(self.with_harmonic(harmonic))
+    }
+
+    /// The harmonic map with this boundary; where its system cannot be solved, there is the start.
+    fn harmonic(&self, monitor: &dyn Monitor) -> Result<Result<QuadraticMap, sparse::Unsolvable>, Interrupted> {
+        match quadratic_map(&self.filled, &self.boundary, monitor) {
+            Ok(map) => Ok(Ok(map)),
+            Err(sparse::Error::Unsolvable(unsolvable)) => Ok(Err(unsolvable)),
+            Err(sparse::Error::Interrupted(interrupted)) => Err(interrupted),
+        }
+    }
+
+    /// `why_none`: why the boundary is not a natural one, where that was asked for.
+    fn on_disk(
+        chart: &Chart,
+        order: Order,
+        why_none: Option<NoNatural>,
+        monitor: &dyn Monitor,
+        checkpoint: &Checkpoint,
+    ) -> Result<Self, MapError> {
         let triangles = chart.triangles().len();
         let filled = FilledChart::new(chart);
         checkpoint.after(triangles)?;
@@ -306,7 +368,7 @@ impl FeasibleStart {
         let hole_centres = (0..filled.loops().len()).map(|k| nodes[filled.centre_node(k)]).collect();
         let certified = prove(planar(&filled, &nodes, hole_centres)).map_err(MapError::Start)?;
         checkpoint.after(triangles)?;
-        Ok(Self { filled, boundary, linear, nodes, certified })
+        Ok(Self { filled, boundary, linear, nodes, certified, found: BoundaryFound::Circle { why_none } })
     }
 
     /// Refuses a chart whose area `ratio` is above `bound`, with the scales that show where to split it.
@@ -318,8 +380,8 @@ impl FeasibleStart {
     }
 
     fn with_harmonic(self, harmonic: Option<Result<QuadraticMap, sparse::Unsolvable>>) -> Maps {
-        let Self { filled, linear, nodes, certified, .. } = self;
-        Maps { filled, linear, start: nodes, certified_start: certified, harmonic }
+        let Self { filled, linear, nodes, certified, found, .. } = self;
+        Maps { filled, linear, start: nodes, certified_start: certified, harmonic, boundary: found }
     }
 }
 
@@ -345,7 +407,7 @@ impl ProvenMap {
 /// Untangles the harmonic map, if there is one, and certifies the result; where that cannot be proven, the result is the
 /// feasible start.
 fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, Interrupted> {
-    let Maps { filled, linear, start, certified_start, harmonic } = maps;
+    let Maps { filled, linear, start, certified_start, harmonic, boundary } = maps;
     let linear =
         LinearSummary { folded: linear.folded(), edges_changed: linear.edges_changed(), method: linear.method() };
     let (harmonic, unsolved) = match harmonic {
@@ -354,7 +416,7 @@ fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, 
         Some(Ok(map)) => (Some(map), None),
     };
     let Some(map) = harmonic else {
-        let provenance = Provenance { linear, harmonic: None, untangle: None, unsolved };
+        let provenance = Provenance { boundary, linear, harmonic: None, untangle: None, unsolved };
         return Ok(ProvenMap { map: certified_start.clone(), start: certified_start, provenance });
     };
     let mut invalid = vec![false; filled.chart_triangles()];
@@ -370,7 +432,7 @@ fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, 
             certified_start.clone()
         }
     };
-    let provenance = Provenance { linear, harmonic, untangle: Some(report), unsolved };
+    let provenance = Provenance { boundary, linear, harmonic, untangle: Some(report), unsolved };
     Ok(ProvenMap { map: certified, start: certified_start, provenance })
 }
 

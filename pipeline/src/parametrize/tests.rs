@@ -1,9 +1,12 @@
 use super::*;
 use crate::atlas::Chart;
-use crate::certified::CertifiedChart;
-use crate::map::natural;
+use crate::certified::{BoundaryFound, CertifiedChart};
+use crate::certify::BoundaryArgument;
+use crate::map::linear::Method;
+use crate::map::natural::{self, NoNatural};
 use crate::monitor::NoMonitor;
-use crate::settings::{ChartSettings, Order};
+use crate::settings::{BoundaryShape, ChartSettings, Order};
+use crate::vec3::Vec3;
 use crate::{repair, shapes};
 
 /// A surface as one chart.
@@ -12,10 +15,13 @@ fn whole(soup: &TriangleSoup) -> Chart {
     decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart").into_charts().remove(0)
 }
 
-/// The job to map a chart, without features.
+/// The job to map a chart to the disk, without features.
 fn job(chart: Chart, max_area_ratio: f64) -> ChartJob {
     let decompose = decompose::Settings { feature_angle: None, max_area_ratio, ..Default::default() };
-    ChartJob { chart, settings: ChartSettings { order: Order::Quadratic, decompose } }
+    ChartJob {
+        chart,
+        settings: ChartSettings { decompose, boundary: BoundaryShape::Circle, ..ChartSettings::default() },
+    }
 }
 
 /// The parts into which one chart of all falls before it is untangled.
@@ -123,4 +129,77 @@ fn the_reason_why_there_is_no_atlas_is_kept() {
     settings.decompose.max_triangles = 0;
     let error = parametrize(&shapes::sphere(4), &settings, &NoMonitor).expect_err("no chart has no triangle");
     assert!(matches!(error, Error::Setting(_)), "{error}");
+}
+
+/// What comes of a surface as one chart, whose natural boundary is asked for.
+fn naturally(soup: &TriangleSoup) -> Vec<CertifiedChart> {
+    let mut job = job(whole(soup), 1e6);
+    job.settings.boundary = BoundaryShape::Natural;
+    job.run(&NoMonitor).expect("maps")
+}
+
+/// A plate with two holes in the plane, each of its points moved.
+fn plate(to: impl Fn(Vec3) -> Vec3) -> TriangleSoup {
+    let flat = shapes::disk_with_holes(13, 2);
+    let points = flat.points().iter().map(|[x, y, _]| to([*x, *y, 0.0])).collect();
+    TriangleSoup::new(points, flat.triangles().to_vec()).expect("sound")
+}
+
+#[test]
+fn what_can_be_laid_out_flat_is_not_stretched() {
+    let tube = shapes::tube(48, 4, 3.0);
+    let half = tube.triangles().iter().filter(|t| t.iter().all(|v| v % 48 <= 24)).copied().collect();
+    let half_cylinder = TriangleSoup::new(tube.points().to_vec(), half).expect("sound");
+    let flat = plate(|[x, y, _]| [5.0 + 0.6 * x, y, -0.8 * x]);
+    // Rolled over a third of a turn.
+    let bent = plate(|[x, y, _]| [x.sin(), y, x.cos()]);
+    for (soup, holes) in [(half_cylinder, 0), (flat, 2), (bent, 2)] {
+        let charts = naturally(&soup);
+        let [chart] = &charts[..] else { panic!("{} charts", charts.len()) };
+        let (distortion, proof) = (chart.distortion(), chart.map().certificate());
+        assert!(distortion.conformal_p99 < 1.1 && distortion.area_ratio < 1.1, "{distortion:?}");
+        // The cheap argument is tried first; it needs a centre for each hole, and nobody gives one.
+        let argument = if holes == 0 { BoundaryArgument::StarShaped } else { BoundaryArgument::Simple };
+        assert_eq!((proof.boundary, proof.holes), (argument, holes));
+        let provenance = chart.provenance();
+        assert_eq!((provenance.boundary, provenance.linear.method), (BoundaryFound::Natural, Method::Conformal));
+    }
+}
+
+#[test]
+fn a_ramp_of_two_turns_that_would_cover_itself_is_mapped_to_the_disk() {
+    let charts = naturally(&shapes::ramp(24, 48));
+    let [chart] = &charts[..] else { panic!("{} charts", charts.len()) };
+    assert_eq!(chart.provenance().boundary, BoundaryFound::Circle { why_none: Some(NoNatural::Crossing) });
+    assert_eq!(chart.map().certificate().boundary, BoundaryArgument::StarShaped);
+    // Less than a turn of it lies beside itself.
+    let short = naturally(&shapes::ramp(24, 20));
+    assert!(short.len() == 1 && short[0].provenance().boundary == BoundaryFound::Natural);
+}
+
+#[test]
+fn what_falls_back_to_the_circle_is_what_the_circle_gives() {
+    let cup = shapes::finger(12, 2);
+    let (fallen, asked) = (naturally(&cup), job(whole(&cup), 1e6).run(&NoMonitor).expect("maps"));
+    assert_eq!((fallen.len(), asked.len()), (1, 1));
+    let why = fallen[0].provenance().boundary;
+    assert!(matches!(why, BoundaryFound::Circle { why_none: Some(NoNatural::Uneven { .. }) }), "{why:?}");
+    assert_eq!(fallen[0].map().map(), asked[0].map().map());
+    assert_eq!(asked[0].provenance().boundary, BoundaryFound::Circle { why_none: None });
+}
+
+#[test]
+fn where_the_conformal_map_folds_a_linear_one_is_found_inside_its_boundary() {
+    let charts = naturally(&shapes::bent_disk(30, 0.45, 0.2));
+    let linear = &charts[0].provenance().linear;
+    assert_eq!((charts.len(), charts[0].provenance().boundary), (1, BoundaryFound::Natural));
+    assert!(linear.method == Method::MMatrix && linear.folded > 0, "{linear:?}");
+    // What is published is no such map: it is untangled from there, with the boundary that it has.
+    let [start, map] = [charts[0].start(), charts[0].map()].map(|m| m.map());
+    let chart = charts[0].chart();
+    assert!(chart.outer().iter().all(|h| {
+        let vertex = chart.from(*h).index();
+        start.nodes[vertex] == map.nodes[vertex]
+    }));
+    assert_ne!(start, map);
 }

@@ -24,7 +24,7 @@ mod refine;
 
 use crate::atlas::Chart;
 use crate::certified::CertifiedAtlas;
-use crate::certify::{CertifiedMap, PlanarMap, StraightMap, parts, polygons, prove};
+use crate::certify::{BoundaryArgument, CertifiedMap, PlanarMap, StraightMap, parts, polygons, prove};
 use crate::grid::{GridPoint, orientation};
 use crate::measure::curvature::Principal;
 use crate::mesh::SurfaceMesh;
@@ -83,6 +83,13 @@ pub enum Error {
         chart: ChartId,
         /// A vertex of the surface there.
         vertex: VertexId,
+    },
+    /// The boundary of a chart touches itself in the plane once its curves are halved as its neighbours need, and the new
+    /// nodes are rounded.
+    #[error("the boundary of chart {chart} touches itself in the plane where its curves are halved")]
+    Touches {
+        /// The chart.
+        chart: ChartId,
     },
     /// Straight parts of a curved triangle stay inverted, in the quadratic and in the linear map.
     #[error(transparent)]
@@ -274,6 +281,14 @@ enum Proven<'a> {
 }
 
 impl Proven<'_> {
+    /// Whether what was proven of its boundary is that it is simple, and not that it can be seen from a point.
+    fn is_polygon(&self) -> bool {
+        match self {
+            Self::Straight(_) => true,
+            Self::Quadratic(map) => map.certificate().boundary == BoundaryArgument::Simple,
+        }
+    }
+
     fn map(&self) -> &PlanarMap {
         match self {
             Self::Straight(map) => map.map(),
@@ -287,6 +302,7 @@ impl Proven<'_> {
 fn split(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<Split, Error> {
     let (mesh, charts, network) = (atlas.mesh(), atlas.charts(), atlas.seams());
     let certified = |c: usize| Proven::Quadratic(Cow::Borrowed(charts[c].map()));
+    let started = |c: usize| Proven::Quadratic(Cow::Borrowed(charts[c].start()));
     let first = |c: usize| match straight[c] {
         Some(map) => (HandedOver::Straight, Proven::Straight(map)),
         None => (HandedOver::Certified, certified(c)),
@@ -301,14 +317,21 @@ fn split(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<Sp
         let failed = match refine::refine(refine::DEPTH, atlas, &current, &mut nodes, &mut split) {
             Ok(refined) => {
                 // The polygon that was proven may have got more nodes, which are rounded.
-                let is_straight = |c: &usize| by[*c] == HandedOver::Straight;
+                let is_polygon = |c: &usize| chosen[*c].is_polygon();
                 let touches = |c: &usize| touches_itself(&split[*c], ChartId::at(*c), network, &nodes);
-                let touching: Vec<usize> = (0..by.len()).filter(is_straight).filter(touches).collect();
+                let touching: Vec<usize> = (0..by.len()).filter(is_polygon).filter(touches).collect();
                 if touching.is_empty() {
                     return Ok(Split { nodes, charts: split, by, refined });
                 }
                 for chart in touching {
-                    (by[chart], chosen[chart]) = (HandedOver::Certified, certified(chart));
+                    (by[chart], chosen[chart]) = match by[chart] {
+                        HandedOver::Straight => (HandedOver::Certified, certified(chart)),
+                        // Its neighbours may halve less when it is plainer itself.
+                        HandedOver::Certified => (HandedOver::Start, started(chart)),
+                        HandedOver::Start | HandedOver::Chords => {
+                            return Err(Error::Touches { chart: ChartId::at(chart) });
+                        }
+                    };
                 }
                 continue;
             }
@@ -318,7 +341,7 @@ fn split(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<Sp
             let start = charts[chart].start();
             (by[chart], chosen[chart]) = match by[chart] {
                 HandedOver::Straight => (HandedOver::Certified, certified(chart)),
-                HandedOver::Certified => (HandedOver::Start, Proven::Quadratic(Cow::Borrowed(start))),
+                HandedOver::Certified => (HandedOver::Start, started(chart)),
                 HandedOver::Start | HandedOver::Chords => {
                     let chords = with_chords(start).ok_or(inverted)?;
                     (HandedOver::Chords, Proven::Quadratic(Cow::Owned(chords)))

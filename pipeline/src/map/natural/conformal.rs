@@ -38,24 +38,46 @@ use crate::monitor::Monitor;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Option<Natural>, sparse::Error> {
-    let held = far_apart(chart);
     let nodes = chart.vertices().len() + chart.edges().len();
+    // The four parts of a triangle have its shape, and so its matrix.
+    let uv = least_squares(chart, nodes, chart.cells().flat_map(similar), 4, monitor)?;
+    Ok(certified(chart, &uv))
+}
+
+/// The least squares conformal map of the triangles of `chart` as they are: the uv of its vertices. It need not be
+/// one-to-one: coarse needles fold. It takes a fraction of the time of [`conformal`].
+///
+/// # Errors
+/// The system cannot be solved, or interrupted.
+pub fn conformal_by_corners(chart: &Chart, monitor: &dyn Monitor) -> Result<Vec<[f64; 2]>, sparse::Error> {
+    let triangles = chart.triangles().iter().map(|t| t.map(|v| v.index()));
+    least_squares(chart, chart.vertices().len(), triangles, 1, monitor)
+}
+
+/// The least squares conformal map of triangles between `nodes` nodes, `per_triangle` of them for each of the chart's and
+/// similar to it, corner by corner.
+fn least_squares(
+    chart: &Chart,
+    nodes: usize,
+    triangles: impl Iterator<Item = [usize; 3]>,
+    per_triangle: usize,
+    monitor: &dyn Monitor,
+) -> Result<Vec<[f64; 2]>, sparse::Error> {
+    let held = far_apart(chart);
     // u and v of each node are scalars of their own, side by side; those of the two nodes that are held are prescribed.
     let free = (0..nodes).filter(|n| !held.contains(n)).flat_map(scalars);
     let dofs = Dofs::new(2 * nodes, free.map(|s| s as u32).collect());
-    let parts: Vec<[usize; 6]> = chart.cells().flat_map(similar).map(part_scalars).collect();
+    let parts: Vec<[usize; 6]> = triangles.map(part_scalars).collect();
     let pattern = dofs.pattern(parts.iter().copied());
     // One node is held at the origin, the other at (1, 0).
     let mut prescribed = vec![[0.0]; 2 * nodes];
     prescribed[scalars(held[1])[0]] = [1.0];
     let mut system = Assembly::new(&dofs, &pattern, prescribed);
     for (i, part) in parts.iter().enumerate() {
-        // The four parts of a triangle have its shape, and so its matrix.
-        system.add(i, part, &element(&chart.shapes()[i / 4]));
+        system.add(i, part, &element(&chart.shapes()[i / per_triangle]));
     }
     let solution = system.solve(&pattern.analyse()?, monitor)?;
-    let uv: Vec<[f64; 2]> = (0..nodes).map(|n| scalars(n).map(|s| solution[s][0])).collect();
-    Ok(certified(chart, &uv))
+    Ok((0..nodes).map(|n| scalars(n).map(|s| solution[s][0])).collect())
 }
 
 /// The numbers of u and v at a node.

@@ -13,6 +13,7 @@
 
 mod conformal;
 mod projection;
+mod start;
 
 use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
@@ -21,8 +22,9 @@ use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, singular_ratio};
 use crate::measure::quantiles::{Weighted, quantiles};
 use crate::monitor::{Interrupted, Monitor};
-pub use conformal::conformal;
+pub use conformal::{conformal, conformal_by_corners};
 pub use projection::projection;
+pub use start::{NaturalStart, NoNatural, natural_start};
 
 /// Maps are scaled into a disk of this radius: well within what the grid holds exactly.
 const RADIUS: f64 = 0.984375;
@@ -239,16 +241,7 @@ mod tests {
     #[test]
     fn what_covers_itself_when_unrolled_is_no_map() {
         // A ramp of two turns: flat, it lies on itself.
-        let (n, turns) = (64, 2.0);
-        let point = |k: u32| {
-            let (turn, radius) =
-                (std::f64::consts::TAU * turns * f64::from(k / 2) / f64::from(n), 1.0 + f64::from(k % 2));
-            [radius * turn.cos(), radius * turn.sin(), 0.05 * turn]
-        };
-        let points = (0..2 * (n + 1)).map(point).collect();
-        let halves = |i: u32| [[2 * i, 2 * i + 1, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 2]];
-        let soup = TriangleSoup::new(points, (0..n).flat_map(halves).collect()).expect("sound");
-        let ramp = charts(&soup);
+        let ramp = charts(&shapes::ramp(32, 64));
         assert_eq!(ramp.len(), 1);
         assert!(projection(&ramp[0], f64::MAX).is_none());
         assert!(conformal(&ramp[0], &NoMonitor).expect("solved").is_none());

@@ -31,22 +31,25 @@ use crate::vec3::{Vec3, cross, dot, norm, sub};
 /// assert!(projection(&hill, 1.5).expect("not so steep").distortion.conformal_p99 < 1.5);
 /// ```
 pub fn projection(chart: &Chart, most: f64) -> Option<Natural> {
-    let triangles = || (0..chart.triangles().len()).map(|f| chart.corners(f));
-    let origin = *chart.points().first()?;
-    let plane = Plane::facing(origin, triangles())?;
-    let mut steepness: Vec<Weighted> = triangles().map(|t| steepness(t, plane.normal())).collect();
-    let [p99] = quantiles(&mut steepness, [0.99]);
-    if p99 > most {
-        return None;
-    }
     // Vertices, then the middles of edges. A projection is linear: the middle goes to the middle.
-    let mut uv: Vec<[f64; 2]> = chart.points().iter().map(|p| plane.coords(*p)).collect();
+    let mut uv = projected(chart, most)?;
     for (_, sides) in chart.edges().iter() {
         let side = sides[0];
         let [from, to] = [chart.from(side), chart.from(side.next())].map(|v| uv[v.index()]);
         uv.push([0, 1].map(|k| 0.5 * (from[k] + to[k])));
     }
     certified(chart, &uv)
+}
+
+/// The uv of the vertices of `chart`, projected along the mean of its normals; none where the conformal distortion of a
+/// hundredth of the area is above `most`.
+pub(super) fn projected(chart: &Chart, most: f64) -> Option<Vec<[f64; 2]>> {
+    let triangles = || (0..chart.triangles().len()).map(|f| chart.corners(f));
+    let origin = *chart.points().first()?;
+    let plane = Plane::facing(origin, triangles())?;
+    let mut steepness: Vec<Weighted> = triangles().map(|t| steepness(t, plane.normal())).collect();
+    let [p99] = quantiles(&mut steepness, [0.99]);
+    (p99 <= most).then(|| chart.points().iter().map(|p| plane.coords(*p)).collect())
 }
 
 /// The area of a triangle over that of its projection along `normal`, which is the conformal distortion of that;
