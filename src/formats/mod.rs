@@ -29,7 +29,7 @@ use location::Location;
 pub use patches::Patches;
 use planish_core::mesh::SoupError;
 use std::path::Path;
-pub use vtk::{vtm, vtp, vtu};
+pub use vtk::{layout, vtm, vtp, vtu};
 
 /// A format that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

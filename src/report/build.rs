@@ -4,6 +4,7 @@ use super::{
     Boundary, Certificate, ChartBoundary, ChartReport, Counts, Distortion, Linear, Quadratic, RepairedSurface, Repairs,
     Seam, Seams, Surface, Untangle,
 };
+use crate::formats::layout::{Placement, layout};
 use crate::settings;
 use planish_core::atlas::Chart;
 use planish_core::certified::BoundaryFound;
@@ -112,10 +113,12 @@ fn seams_of(chart: &Chart, network: &SeamNetwork) -> Vec<u32> {
 /// The charts of an atlas.
 pub fn charts(atlas: &CertifiedAtlas) -> Vec<ChartReport> {
     let colours = atlas.seams().colours();
-    atlas.charts().iter().zip(colours).map(|(certified, colour)| chart(certified, colour, atlas.seams())).collect()
+    let places = layout(atlas.charts());
+    let look = colours.into_iter().zip(places);
+    atlas.charts().iter().zip(look).map(|(c, (colour, place))| chart(c, colour, place, atlas.seams())).collect()
 }
 
-fn chart(certified: &CertifiedChart, colour: u32, network: &SeamNetwork) -> ChartReport {
+fn chart(certified: &CertifiedChart, colour: u32, place: Placement, network: &SeamNetwork) -> ChartReport {
     let chart = certified.chart();
     let provenance = certified.provenance();
     let unit = chart.scale() * chart.scale();
@@ -145,6 +148,8 @@ fn chart(certified: &CertifiedChart, colour: u32, network: &SeamNetwork) -> Char
             conformal_p99: summary.conformal_p99,
             area_ratio: summary.area_ratio,
         },
+        uv_scale: place.scale,
+        shift: place.shift,
     }
 }
 

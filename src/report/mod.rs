@@ -291,6 +291,16 @@ pub struct ChartReport {
     pub certificate: Certificate,
     /// The distortion.
     pub distortion: Distortion,
+    /// A power of two: uv times it have the size of the chart in space, in the unit of the input.
+    #[serde(default = "one")]
+    pub uv_scale: f64,
+    /// Where the chart lies in param.vtu: uv times `uv_scale`, moved by this.
+    #[serde(default)]
+    pub shift: [f64; 2],
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// The boundary of a chart in the plane. Results that say nothing have the circle.

@@ -6,6 +6,7 @@
 //! fails the first one even if all checksums were made anew.
 
 use super::{Exit, eprint_line, escape, say};
+use crate::formats::layout::Placement;
 use crate::formats::vtu::{self, Grid};
 use crate::input::read_file;
 use crate::outcome::{Reason, Status};
@@ -112,7 +113,7 @@ fn check_one(folder: &Path) -> Findings {
                     Err(finding) => found.wrong.push(finding),
                 }
             }
-            found.wrong.extend(check_param(folder, &grid, report.charts.len()).err());
+            found.wrong.extend(check_param(folder, &grid, &report.charts).err());
         }
         Err(finding) => found.wrong.push(finding),
     }
@@ -298,7 +299,7 @@ fn unproven(grid: &Grid, cells: &[usize], chart: u32, error: certify::Error) -> 
 }
 
 /// param.vtu must show the same map: same cells, fields and uv, points at uv plus the shift of their chart.
-fn check_param(folder: &Path, surface: &Grid, charts: usize) -> Result<(), Finding> {
+fn check_param(folder: &Path, surface: &Grid, charts: &[ChartReport]) -> Result<(), Finding> {
     let param = read_grid(folder, result_files::PARAM)?;
     let same = param.cells == surface.cells
         && param.uv == surface.uv
@@ -308,11 +309,13 @@ fn check_param(folder: &Path, surface: &Grid, charts: usize) -> Result<(), Findi
         return Err(file(result_files::PARAM, "its cells, fields or uv differ from those of surface.vtu"));
     }
     for (cell, chart) in param.cells.iter().zip(&param.chart) {
-        let [x, y] = vtu::shift(usize::try_from(*chart).unwrap_or(0), charts);
+        let Some(chart) = usize::try_from(*chart).ok().and_then(|c| charts.get(c)) else {
+            return Err(file(result_files::PARAM, format!("it has a chart {chart}, and the report has none")));
+        };
+        let place = Placement { scale: chart.uv_scale, shift: chart.shift };
         for node in cell {
-            let [u, v] = param.uv[*node as usize];
             // The same sums as when it was written: exactly the same numbers.
-            if param.points[*node as usize] != [u + x, v + y, 0.0] {
+            if param.points[*node as usize] != place.of(param.uv[*node as usize]) {
                 return Err(file(result_files::PARAM, format!("point {node} does not lie at its uv")));
             }
         }

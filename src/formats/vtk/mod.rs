@@ -6,6 +6,7 @@
 
 mod cell;
 mod error;
+pub mod layout;
 mod legacy;
 mod legacy_arrays;
 mod packed;

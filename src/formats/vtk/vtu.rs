@@ -1,6 +1,7 @@
 //! surface.vtu and param.vtu: written for ParaView by `vtkio`, and read again by `planish check`.
 
 use super::error::VtkError;
+use super::layout::layout;
 pub use super::read_back::{read, read_shape};
 use planish_core::atlas::Chart;
 use planish_core::measure::distortion::CellFields;
@@ -62,20 +63,6 @@ pub struct Shape {
     pub chart: Vec<i32>,
 }
 
-/// The shift of chart `index` of `count` in param.vtu: unit disks in a square grid.
-///
-/// ```
-/// use planish::formats::vtu::shift;
-///
-/// // Five charts lie in rows of three, from the top left to the bottom right.
-/// let shifts: Vec<[f64; 2]> = (0..5).map(|chart| shift(chart, 5)).collect();
-/// assert_eq!(shifts, [[0.0, 0.0], [2.25, 0.0], [4.5, 0.0], [0.0, -2.25], [2.25, -2.25]]);
-/// ```
-pub fn shift(index: usize, count: usize) -> [f64; 2] {
-    let columns = (count as f64).sqrt().ceil().max(1.0) as usize;
-    [2.25 * (index % columns) as f64, -2.25 * (index / columns) as f64]
-}
-
 /// The bytes of surface.vtu.
 ///
 /// # Errors
@@ -84,15 +71,14 @@ pub fn surface(atlas: &CertifiedAtlas) -> Result<Vec<u8>, VtuError> {
     encode(atlas, "planish surface", |certified, node, _| position(certified.chart(), node))
 }
 
-/// The bytes of param.vtu: the same cells in the parametric plane, charts side by side.
+/// The bytes of param.vtu: the same cells in the parametric plane, charts beside each other, each in its own size (see
+/// [`layout`]).
 ///
 /// # Errors
 /// [`VtuError::Library`].
 pub fn param(atlas: &CertifiedAtlas) -> Result<Vec<u8>, VtuError> {
-    encode(atlas, "planish parametric plane", |certified, _, uv| {
-        let [x, y] = shift(certified.id().index(), atlas.charts().len());
-        [uv[0] + x, uv[1] + y, 0.0]
-    })
+    let places = layout(atlas.charts());
+    encode(atlas, "planish parametric plane", |certified, _, uv| places[certified.id().index()].of(uv))
 }
 
 /// The position of a node in space: that of a vertex, or the middle of a straight edge.

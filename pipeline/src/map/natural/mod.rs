@@ -14,6 +14,7 @@
 mod conformal;
 mod projection;
 mod start;
+mod upright;
 
 use crate::atlas::Chart;
 use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
@@ -22,6 +23,7 @@ use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, singular_ratio};
 use crate::measure::quantiles::{Weighted, quantiles};
 use crate::monitor::{Interrupted, Monitor};
+use crate::topology::VertexId;
 pub use conformal::{conformal, conformal_by_corners};
 pub use projection::projection;
 pub use start::{NaturalStart, NoNatural, natural_start};
@@ -108,22 +110,59 @@ fn certified(chart: &Chart, uv: &[[f64; 2]]) -> Option<Natural> {
 
 /// Places moved and scaled into a disk of [`RADIUS`] around the origin; none where they all are one, or not finite.
 fn fitted(uv: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-    let mut min = [f64::INFINITY; 2];
-    let mut max = [f64::NEG_INFINITY; 2];
-    for p in uv {
-        for k in 0..2 {
-            min[k] = min[k].min(p[k]);
-            max[k] = max[k].max(p[k]);
+    let around = Around::of(uv);
+    around.scaled(uv, RADIUS / around.half_diagonal())
+}
+
+/// The places of the vertices of `chart`, turned to lie straight, moved and scaled into that disk, and so that a power of
+/// two is between the areas of lengths there and in space; none where they all are one, or not finite, or the triangles
+/// have no area.
+fn fitted_to_size(chart: &Chart, mut uv: Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>> {
+    let doubled = |t: &[VertexId; 3]| {
+        let [a, b, c] = t.map(|v| uv[v.index()]);
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
+    let in_plane = 0.5 * chart.triangles().iter().map(doubled).sum::<f64>();
+    let in_space = chart.shapes().iter().map(|s| s.area()).sum::<f64>();
+    let to_size = (in_space / in_plane).sqrt();
+    upright::upright(&mut uv);
+    let around = Around::of(&uv);
+    // The unit of the shapes is a power of two times that of the input.
+    let halvings = (to_size * around.half_diagonal() / RADIUS).log2().ceil();
+    around.scaled(&uv, to_size * (-halvings).exp2())
+}
+
+/// The box around places.
+struct Around {
+    min: [f64; 2],
+    max: [f64; 2],
+}
+
+impl Around {
+    fn of(uv: &[[f64; 2]]) -> Self {
+        let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for p in uv {
+            for k in 0..2 {
+                min[k] = min[k].min(p[k]);
+                max[k] = max[k].max(p[k]);
+            }
         }
+        Self { min, max }
     }
-    let half_diagonal = 0.5 * (max[0] - min[0]).hypot(max[1] - min[1]);
-    // Infinite where all uv are one, zero where one of them is infinite.
-    let scale = RADIUS / half_diagonal;
-    if !scale.is_finite() || scale <= 0.0 {
-        return None;
+
+    fn half_diagonal(&self) -> f64 {
+        0.5 * (self.max[0] - self.min[0]).hypot(self.max[1] - self.min[1])
     }
-    let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (min[k] + max[k])) * scale);
-    Some(uv.iter().map(moved).collect())
+
+    /// Places moved to the origin and scaled; none where the scale is no number (infinite where all places are one, zero
+    /// where one of them is infinite).
+    fn scaled(&self, uv: &[[f64; 2]], scale: f64) -> Option<Vec<[f64; 2]>> {
+        if !scale.is_finite() || scale <= 0.0 {
+            return None;
+        }
+        let moved = |p: &[f64; 2]| [0, 1].map(|k| (p[k] - 0.5 * (self.min[k] + self.max[k])) * scale);
+        Some(uv.iter().map(moved).collect())
+    }
 }
 
 /// How much the parts of a chart's triangles are stretched. The area ratio is that of parts, not of stars.

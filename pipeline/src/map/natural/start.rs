@@ -7,7 +7,7 @@
 //! boundary that is simple, a linear map with this boundary.
 
 use super::projection::projected;
-use super::{EVEN, STEEP, conformal_by_corners, fitted};
+use super::{EVEN, STEEP, conformal_by_corners, fitted_to_size};
 use crate::atlas::Chart;
 use crate::certify::{self, CertifiedMap, PlanarMap, prove};
 use crate::fem::sparse;
@@ -100,7 +100,7 @@ pub fn natural_start(
     let most = EVEN.min(max_area_ratio);
     let filled = FilledChart::open(chart);
     let conformal = match conformal_by_corners(chart, monitor) {
-        Ok(uv) => within(chart, &filled, &uv, Method::Conformal, most, monitor)?,
+        Ok(uv) => within(chart, &filled, uv, Method::Conformal, most, monitor)?,
         Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted),
         Err(sparse::Error::Unsolvable(_)) => Err(NoNatural::Unsolvable),
     };
@@ -110,19 +110,19 @@ pub fn natural_start(
     };
     // What is told is why the better of both failed.
     let Some(uv) = projected(chart, STEEP) else { return Ok(Err(why)) };
-    Ok(within(chart, &filled, &uv, Method::Projection, most, monitor)?.map_err(|_| why))
+    Ok(within(chart, &filled, uv, Method::Projection, most, monitor)?.map_err(|_| why))
 }
 
 /// The start with its boundary vertices at these of `uv`.
 fn within(
     chart: &Chart,
     filled: &FilledChart,
-    uv: &[[f64; 2]],
+    uv: Vec<[f64; 2]>,
     method: Method,
     most: f64,
     monitor: &dyn Monitor,
 ) -> Result<Result<NaturalStart, NoNatural>, Interrupted> {
-    let Some(fitted) = fitted(uv) else { return Ok(Err(NoNatural::Unsolvable)) };
+    let Some(fitted) = fitted_to_size(chart, uv) else { return Ok(Err(NoNatural::Unsolvable)) };
     let vertices: Vec<GridPoint> = fitted.into_iter().map(GridPoint::vertex).collect();
     let boundary = Boundary::chords(filled, |v| vertices[v.index()]);
     let linear = match LinearMap::through(filled, vertices, method) {
