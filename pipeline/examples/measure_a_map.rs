@@ -3,16 +3,16 @@
 //! `cargo run --release -p planish-core --example measure_a_map`
 
 use planish_core::monitor::NoMonitor;
-use planish_core::{Order, Settings, parametrize, shapes};
+use planish_core::{BoundaryShape, Order, Settings, parametrize, shapes};
 use std::f64::consts::PI;
 
-/// Maps half a sphere by linear and by quadratic elements, and prints how both distort it.
+/// Maps a hill to the disk by linear and by quadratic elements, and prints how both distort it.
 ///
 /// # Errors
 /// None: the surface is sound.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     for order in [Order::Linear, Order::Quadratic] {
-        let settings = Settings { order, ..Settings::default() };
+        let settings = Settings { order, boundary: BoundaryShape::Circle, ..Settings::default() };
         let atlas = parametrize(&shapes::disk(12), &settings, &NoMonitor)?;
         let certified = &atlas.charts()[0];
         let summary = certified.distortion();

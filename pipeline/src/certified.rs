@@ -26,10 +26,10 @@ use crate::untangle;
 /// // The nodes of the map: the vertices of the chart, then the middles of its edges.
 /// let (chart, map) = (certified.chart(), certified.map().map());
 /// assert_eq!(map.nodes.len(), chart.points().len() + chart.edges().len());
-/// // Its boundary lies on the unit circle.
-/// let on_rim = chart.from(chart.outer()[0]);
-/// let [u, v] = map.nodes[on_rim.index()].uv();
-/// assert!((u.hypot(v) - 1.0).abs() < 1e-15);
+/// // Its boundary consists of chords: the middle of an edge lies in the middle, exactly.
+/// let side = chart.outer()[0];
+/// let [from, to] = [side, side.next()].map(|h| map.nodes[chart.from(h).index()]);
+/// assert_eq!(map.nodes[chart.points().len() + chart.edges().edge(side).index()], from.midpoint(to));
 /// # Ok::<(), planish_core::Error>(())
 /// ```
 #[derive(Clone, Debug)]

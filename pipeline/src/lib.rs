@@ -1,7 +1,7 @@
 //! The core of planish: from a soup of triangles to quadratic maps that are proven to be one-to-one.
 //!
 //! A poor surface triangulation (a scan, a segmentation, a terrain, a CAD export) is cut into charts, and each chart is
-//! mapped to a disk, perhaps with holes, by quadratic finite elements. What comes out is a [`CertifiedAtlas`]: its maps are
+//! mapped to the plane by quadratic finite elements. What comes out is a [`CertifiedAtlas`]: its maps are
 //! one-to-one, proven in exact integer arithmetic on the numbers that it holds.
 //!
 //! ```
@@ -27,8 +27,9 @@
 //!    with mollified edge lengths; [`Repaired::accepted`](repair::Repaired::accepted) leaves out what no atlas can be made of.
 //! 2. [`Plan::new`] cuts the surface into [`Chart`](atlas::Chart)s ([`decompose()`]): parts that a disk, perhaps with holes,
 //!    can carry. Each becomes a [`ChartJob`], which needs nothing but itself.
-//! 3. [`ChartJob::map`] makes the [`linear`](map::linear) map, which does not fold, and the harmonic
-//!    [`quadratic`](map::quadratic) map, whose curved triangles may be invalid. Charts that one map does not suit are split.
+//! 3. [`ChartJob::map`] chooses the boundary in the plane ([natural](map::natural), or the [circle](map::boundary)), and makes
+//!    the [`linear`](map::linear) map, which does not fold, and the harmonic [`quadratic`](map::quadratic) map, whose curved
+//!    triangles may be invalid. Charts that one map does not suit are split.
 //! 4. [`MappedChart::untangle`] makes the triangles valid ([`mod@untangle`]) while keeping the Dirichlet energy as low as it can
 //!    be, and proves the result one-to-one ([`certify`]): a [`CertifiedChart`].
 //! 5. [`CertifiedAtlas::gather`] puts the charts together, and finds the [curves](seams) between them.
@@ -50,7 +51,8 @@
 //!
 //! * The map is a local minimiser of the energy, within the maps whose jacobians have positive Bernstein coefficients: a
 //!   better one may exist.
-//! * Triangles are flat in space, so far, and boundaries of maps round.
+//! * Triangles of the input are flat in space, so far. Not every chart has a natural boundary that is one-to-one and even;
+//!   the others have the circle, and say why ([`certified::BoundaryFound`]).
 //!
 //! # Source
 //!

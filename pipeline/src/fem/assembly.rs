@@ -56,6 +56,15 @@ impl<'a, const C: usize> Assembly<'a, C> {
         }
     }
 
+    /// Adds to the right-hand sides at a node; at prescribed nodes there are none.
+    pub fn add_load(&mut self, node: usize, load: [f64; C]) {
+        if let Some(row) = self.dofs.unknown(node) {
+            for (k, value) in load.into_iter().enumerate() {
+                self.rhs[k * self.dofs.count() + row] += value;
+            }
+        }
+    }
+
     /// The values of the fields at all nodes. `analysis` is that of the pattern.
     ///
     /// # Errors

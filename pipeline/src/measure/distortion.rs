@@ -45,9 +45,10 @@ pub struct Summary {
 /// ```
 /// use planish_core::measure::distortion::{area_ratio, fields, summary};
 /// use planish_core::monitor::NoMonitor;
-/// use planish_core::{Settings, parametrize, shapes};
+/// use planish_core::{BoundaryShape, Settings, parametrize, shapes};
 ///
-/// let atlas = parametrize(&shapes::disk(6), &Settings::default(), &NoMonitor)?;
+/// let settings = Settings { boundary: BoundaryShape::Circle, ..Settings::default() };
+/// let atlas = parametrize(&shapes::disk(6), &settings, &NoMonitor)?;
 /// let (chart, map) = (atlas.charts()[0].chart(), atlas.charts()[0].map());
 /// let fields = fields(chart, map);
 /// // Area scales are areas in the plane per area in space: together they give the area of the disk.

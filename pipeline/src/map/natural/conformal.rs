@@ -12,6 +12,7 @@ use crate::fem::dofs::Dofs;
 use crate::fem::sparse;
 use crate::mesh::TriangleShape;
 use crate::monitor::Monitor;
+use crate::vec3::{Vec3, norm, sub};
 
 /// The least squares conformal map of `chart`; none where it is not one-to-one.
 ///
@@ -40,7 +41,7 @@ use crate::monitor::Monitor;
 pub fn conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Option<Natural>, sparse::Error> {
     let nodes = chart.vertices().len() + chart.edges().len();
     // The four parts of a triangle have its shape, and so its matrix.
-    let uv = least_squares(chart, nodes, chart.cells().flat_map(similar), 4, monitor)?;
+    let uv = least_squares(chart, far_apart(chart), nodes, chart.cells().flat_map(similar), 4, monitor)?;
     Ok(certified(chart, &uv))
 }
 
@@ -51,19 +52,21 @@ pub fn conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Option<Natural>
 /// The system cannot be solved, or interrupted.
 pub fn conformal_by_corners(chart: &Chart, monitor: &dyn Monitor) -> Result<Vec<[f64; 2]>, sparse::Error> {
     let triangles = chart.triangles().iter().map(|t| t.map(|v| v.index()));
-    least_squares(chart, chart.vertices().len(), triangles, 1, monitor)
+    least_squares(chart, extremes(chart), chart.vertices().len(), triangles, 1, monitor)
 }
 
 /// The least squares conformal map of triangles between `nodes` nodes, `per_triangle` of them for each of the chart's and
 /// similar to it, corner by corner.
+///
+/// The two nodes `held` decide which of the maps that are nearly conformal it is, as they keep their places.
 fn least_squares(
     chart: &Chart,
+    held: [usize; 2],
     nodes: usize,
     triangles: impl Iterator<Item = [usize; 3]>,
     per_triangle: usize,
     monitor: &dyn Monitor,
 ) -> Result<Vec<[f64; 2]>, sparse::Error> {
-    let held = far_apart(chart);
     // u and v of each node are scalars of their own, side by side; those of the two nodes that are held are prescribed.
     let free = (0..nodes).filter(|n| !held.contains(n)).flat_map(scalars);
     let dofs = Dofs::new(2 * nodes, free.map(|s| s as u32).collect());
@@ -111,6 +114,25 @@ fn far_apart(chart: &Chart) -> [usize; 2] {
     // Two vertices, even where one edge is half of the loop or more.
     let opposite = opposite.max(1);
     [0, opposite].map(|i| chart.from(chart.outer()[i]).index())
+}
+
+/// Two vertices of the outer loop that are far apart in space, whatever vertex the loop begins at: the farthest from the mean
+/// of all, and the farthest from that one.
+fn extremes(chart: &Chart) -> [usize; 2] {
+    let on_loop: Vec<usize> = chart.outer().iter().map(|h| chart.from(*h).index()).collect();
+    let mean = [0, 1, 2].map(|k| on_loop.iter().map(|v| chart.points()[*v][k]).sum::<f64>() / on_loop.len() as f64);
+    let farthest_from = |p: Vec3, but: Option<usize>| {
+        let others = on_loop.iter().filter(|v| Some(**v) != but);
+        let distance = |v: usize| norm(sub(chart.points()[v], p));
+        others.fold(None, |best: Option<(f64, usize)>, v| {
+            let here = distance(*v);
+            if best.is_some_and(|(most, _)| most >= here) { best } else { Some((here, *v)) }
+        })
+    };
+    // A loop has three vertices or more.
+    let first = farthest_from(mean, None).map_or(on_loop[0], |(_, v)| v);
+    let second = farthest_from(chart.points()[first], Some(first)).map_or(on_loop[1], |(_, v)| v);
+    [first, second]
 }
 
 /// The matrix of the energy of a triangle, for its corners' u and then their v.

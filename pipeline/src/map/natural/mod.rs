@@ -11,6 +11,7 @@
 //!
 //! Neither is one-to-one by construction. What the certifier does not prove is no [`Natural`].
 
+mod boundary_first;
 mod conformal;
 mod projection;
 mod start;
@@ -23,7 +24,6 @@ use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, singular_ratio};
 use crate::measure::quantiles::{Weighted, quantiles};
 use crate::monitor::{Interrupted, Monitor};
-use crate::topology::VertexId;
 pub use conformal::{conformal, conformal_by_corners};
 pub use projection::projection;
 pub use start::{NaturalStart, NoNatural, natural_start};
@@ -70,9 +70,10 @@ const EVEN: f64 = 100.0;
 /// ```
 /// use planish_core::map::natural::natural;
 /// use planish_core::monitor::NoMonitor;
-/// use planish_core::{Settings, parametrize, shapes};
+/// use planish_core::{BoundaryShape, Settings, parametrize, shapes};
 ///
-/// let plate = parametrize(&shapes::disk_with_holes(13, 2), &Settings::default(), &NoMonitor)?;
+/// let settings = Settings { boundary: BoundaryShape::Circle, ..Settings::default() };
+/// let plate = parametrize(&shapes::disk_with_holes(13, 2), &settings, &NoMonitor)?;
 /// let on_disk = plate.charts()[0].distortion().conformal_p99;
 /// let own = natural(plate.charts()[0].chart(), on_disk, &NoMonitor)?.expect("it is nearly flat");
 /// assert!(own.distortion.conformal_p99 < on_disk);
@@ -114,15 +115,10 @@ fn fitted(uv: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
     around.scaled(uv, RADIUS / around.half_diagonal())
 }
 
-/// The places of the vertices of `chart`, turned to lie straight, moved and scaled into that disk, and so that a power of
-/// two is between the areas of lengths there and in space; none where they all are one, or not finite, or the triangles
-/// have no area.
-fn fitted_to_size(chart: &Chart, mut uv: Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>> {
-    let doubled = |t: &[VertexId; 3]| {
-        let [a, b, c] = t.map(|v| uv[v.index()]);
-        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    };
-    let in_plane = 0.5 * chart.triangles().iter().map(doubled).sum::<f64>();
+/// Places of vertices of `chart`, whose triangles have the area `in_plane` there: turned to lie straight, moved and scaled
+/// into that disk, and so that lengths there and in space differ by a power of two, on the mean; none where they all are
+/// one, or not finite, or the triangles have no area.
+fn fitted_to_size(chart: &Chart, in_plane: f64, mut uv: Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>> {
     let in_space = chart.shapes().iter().map(|s| s.area()).sum::<f64>();
     let to_size = (in_space / in_plane).sqrt();
     upright::upright(&mut uv);

@@ -1,11 +1,11 @@
 //! Where the map of a chart with a natural boundary begins.
 //!
-//! Only the *boundary* is taken from the conformal map: its vertices, and the chords between them. Edges of the boundary
+//! Only the *boundary* is taken from a conformal map: its vertices, and the chords between them. Edges of the boundary
 //! are straight in space, and so are their images in every triangle of a map that is conformal there, so that chords lose
 //! nothing, and a boundary of chords is a polygon. What lies inside is found anew by quadratic elements, which need not be
-//! valid; so a start is asked for that is: the conformal map itself, its degree elevated, or, where that folds inside a
-//! boundary that is simple, a linear map with this boundary.
+//! valid; so a start is asked for that is: a linear map with this boundary, or the conformal map itself, its degree elevated.
 
+use super::boundary_first::boundary_first;
 use super::projection::projected;
 use super::{EVEN, STEEP, conformal_by_corners, fitted_to_size};
 use crate::atlas::Chart;
@@ -16,7 +16,8 @@ use crate::map::boundary::Boundary;
 use crate::map::filled::FilledChart;
 use crate::map::linear::{self, LinearMap, Method, linear_map};
 use crate::measure::distortion;
-use crate::monitor::{Interrupted, Monitor};
+use crate::monitor::{Checkpoint, Interrupted, Monitor};
+use crate::topology::VertexId;
 
 /// A chart with open holes, its natural boundary, and a valid map inside it.
 #[derive(Clone, Debug)]
@@ -66,8 +67,9 @@ pub enum NoNatural {
     Unsolvable,
 }
 
-/// Finds the natural boundary of `chart`, and a valid map inside it: by the conformal map, or, for what is nearly a plane
-/// and where that fails, by the projection. None of them scales areas by more than 100, or `max_area_ratio` where that is
+/// Finds the natural boundary of `chart`, and a valid map inside it: by boundary first flattening, where it has no holes;
+/// else, or where that fails, by the least squares conformal map of its vertices; else, for what is nearly a plane, by the
+/// projection. None of them scales areas by more than 100, or `max_area_ratio` where that is
 /// less.
 ///
 /// # Errors
@@ -97,55 +99,148 @@ pub fn natural_start(
     max_area_ratio: f64,
     monitor: &dyn Monitor,
 ) -> Result<Result<NaturalStart, NoNatural>, Interrupted> {
-    let most = EVEN.min(max_area_ratio);
-    let filled = FilledChart::open(chart);
-    let conformal = match conformal_by_corners(chart, monitor) {
-        Ok(uv) => within(chart, &filled, uv, Method::Conformal, most, monitor)?,
-        Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted),
-        Err(sparse::Error::Unsolvable(_)) => Err(NoNatural::Unsolvable),
-    };
-    let why = match conformal {
-        Ok(start) => return Ok(Ok(start)),
-        Err(why) => why,
-    };
-    // What is told is why the better of both failed.
-    let Some(uv) = projected(chart, STEEP) else { return Ok(Err(why)) };
-    Ok(within(chart, &filled, uv, Method::Projection, most, monitor)?.map_err(|_| why))
+    let search = Search { chart, filled: FilledChart::open(chart), most: EVEN.min(max_area_ratio), monitor };
+    let mut why = NoNatural::Unsolvable;
+    // What is told is why the best one failed.
+    for (rank, candidate) in
+        [Candidate::BoundaryFirst, Candidate::LeastSquares, Candidate::Projection].iter().enumerate()
+    {
+        Checkpoint::new(monitor).end()?;
+        match search.by(*candidate)? {
+            Ok(start) => return Ok(Ok(start)),
+            Err(Some(reason)) if rank == 0 || why == NoNatural::Unsolvable => why = reason,
+            Err(_) => {}
+        }
+    }
+    Ok(Err(why))
 }
 
-/// The start with its boundary vertices at these of `uv`.
-fn within(
-    chart: &Chart,
-    filled: &FilledChart,
-    uv: Vec<[f64; 2]>,
-    method: Method,
+/// Where a boundary may come from, in the order in which they are tried.
+#[derive(Clone, Copy)]
+enum Candidate {
+    /// Boundary first flattening: for charts without holes.
+    BoundaryFirst,
+    /// The least squares conformal map of the vertices.
+    LeastSquares,
+    /// The projection along the mean of the normals.
+    Projection,
+}
+
+/// A start, or why there is none by some candidate; nothing where that does not apply.
+type Found = Result<NaturalStart, Option<NoNatural>>;
+
+struct Search<'a> {
+    chart: &'a Chart,
+    filled: FilledChart,
+    /// The largest area ratio.
     most: f64,
-    monitor: &dyn Monitor,
-) -> Result<Result<NaturalStart, NoNatural>, Interrupted> {
-    let Some(fitted) = fitted_to_size(chart, uv) else { return Ok(Err(NoNatural::Unsolvable)) };
-    let vertices: Vec<GridPoint> = fitted.into_iter().map(GridPoint::vertex).collect();
-    let boundary = Boundary::chords(filled, |v| vertices[v.index()]);
-    let linear = match LinearMap::through(filled, vertices, method) {
-        Ok(map) => map,
-        Err(linear::Error::Folded { folded, .. }) => match linear_map(filled, &boundary, monitor) {
-            Ok(map) => map,
-            Err(linear::Error::Interrupted(interrupted)) => return Err(interrupted),
-            Err(_) => return Ok(Err(NoNatural::Folded { triangles: folded })),
-        },
-        Err(_) => return Ok(Err(NoNatural::Unsolvable)),
-    };
-    let nodes = linear.degree_elevated(filled, &boundary);
-    let cells = chart.cells().collect();
-    let certified = match prove(PlanarMap { cells, nodes: nodes.clone(), hole_centres: vec![] }) {
-        Ok(certified) => certified,
-        Err(certify::Error::InvalidTriangles { count, .. }) => return Ok(Err(NoNatural::Folded { triangles: count })),
-        Err(_) => return Ok(Err(NoNatural::Crossing)),
-    };
-    let ratio = distortion::area_ratio(chart, &certified);
-    if ratio > most {
-        return Ok(Err(NoNatural::Uneven { ratio }));
+    monitor: &'a dyn Monitor,
+}
+
+impl Search<'_> {
+    fn by(&self, candidate: Candidate) -> Result<Found, Interrupted> {
+        let Self { chart, filled, monitor, .. } = self;
+        let places = match candidate {
+            Candidate::BoundaryFirst if !chart.holes().is_empty() => return Ok(Err(None)),
+            Candidate::BoundaryFirst => {
+                boundary_first(chart, filled, *monitor).map(|found| found.map(Places::Boundary))
+            }
+            Candidate::LeastSquares => {
+                conformal_by_corners(chart, *monitor).map(|uv| Some(Places::All(uv, Method::Conformal)))
+            }
+            Candidate::Projection => Ok(projected(chart, STEEP).map(|uv| Places::All(uv, Method::Projection))),
+        };
+        match places {
+            Ok(Some(places)) => self.within(places),
+            Ok(None) => Ok(Err(None)),
+            Err(sparse::Error::Interrupted(interrupted)) => Err(interrupted),
+            Err(sparse::Error::Unsolvable(_)) => Ok(Err(Some(NoNatural::Unsolvable))),
+        }
     }
-    let conformal_p99 = distortion::conformal_p99_of_nodes(chart, |f| filled.nodes(f).map(|n| nodes[n]));
-    let filled = filled.clone();
-    Ok(Ok(NaturalStart { filled, boundary, linear, nodes, certified, conformal_p99, area_ratio: ratio }))
+
+    /// The start with the boundary at these places.
+    fn within(&self, places: Places) -> Result<Found, Interrupted> {
+        let Self { chart, filled, most, monitor } = self;
+        let refused = |why: NoNatural| Ok(Err(Some(why)));
+        let checkpoint = Checkpoint::new(*monitor);
+        let Some(places) = places.fitted(chart) else { return refused(NoNatural::Unsolvable) };
+        checkpoint.end()?;
+        let (boundary, linear) = match places {
+            Places::Boundary(corners) => {
+                let mut at = vec![GridPoint::default(); chart.vertices().len()];
+                for (h, uv) in chart.outer().iter().zip(corners) {
+                    at[chart.from(*h).index()] = GridPoint::vertex(uv);
+                }
+                let boundary = Boundary::chords(filled, |v| at[v.index()]);
+                let linear = linear_map(filled, &boundary, *monitor);
+                (boundary, linear)
+            }
+            Places::All(uv, method) => {
+                let vertices: Vec<GridPoint> = uv.into_iter().map(GridPoint::vertex).collect();
+                let boundary = Boundary::chords(filled, |v| vertices[v.index()]);
+                let linear = match LinearMap::through(filled, vertices, method) {
+                    Err(linear::Error::Folded { .. }) => linear_map(filled, &boundary, *monitor),
+                    found => found,
+                };
+                (boundary, linear)
+            }
+        };
+        let linear = match linear {
+            Ok(linear) => linear,
+            Err(linear::Error::Interrupted(interrupted)) => return Err(interrupted),
+            Err(linear::Error::Folded { folded, .. }) => return refused(NoNatural::Folded { triangles: folded }),
+            Err(linear::Error::Solver(_)) => return refused(NoNatural::Unsolvable),
+        };
+        checkpoint.end()?;
+        let nodes = linear.degree_elevated(filled, &boundary);
+        let cells = chart.cells().collect();
+        let certified = match prove(PlanarMap { cells, nodes: nodes.clone(), hole_centres: vec![] }) {
+            Ok(certified) => certified,
+            Err(certify::Error::InvalidTriangles { count, .. }) => {
+                return refused(NoNatural::Folded { triangles: count });
+            }
+            Err(_) => return refused(NoNatural::Crossing),
+        };
+        checkpoint.end()?;
+        let area_ratio = distortion::area_ratio(chart, &certified);
+        if area_ratio > *most {
+            return refused(NoNatural::Uneven { ratio: area_ratio });
+        }
+        let conformal_p99 = distortion::conformal_p99_of_nodes(chart, |f| filled.nodes(f).map(|n| nodes[n]));
+        let filled = filled.clone();
+        Ok(Ok(NaturalStart { filled, boundary, linear, nodes, certified, conformal_p99, area_ratio }))
+    }
+}
+
+/// Places in the plane.
+enum Places {
+    /// Of the vertices of the outer loop, in its order.
+    Boundary(Vec<[f64; 2]>),
+    /// Of all vertices, and how they were found.
+    All(Vec<[f64; 2]>, Method),
+}
+
+impl Places {
+    /// Turned, moved and scaled so that they fit.
+    fn fitted(self, chart: &Chart) -> Option<Self> {
+        Some(match self {
+            // The area of the polygon is that of all triangles.
+            Self::Boundary(corners) => {
+                let doubled = |i: usize| {
+                    let (p, q) = (corners[i], corners[(i + 1) % corners.len()]);
+                    p[0] * q[1] - q[0] * p[1]
+                };
+                let area = 0.5 * (0..corners.len()).map(doubled).sum::<f64>();
+                Self::Boundary(fitted_to_size(chart, area, corners)?)
+            }
+            Self::All(uv, method) => {
+                let doubled = |t: &[VertexId; 3]| {
+                    let [a, b, c] = t.map(|v| uv[v.index()]);
+                    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+                };
+                let area = 0.5 * chart.triangles().iter().map(doubled).sum::<f64>();
+                Self::All(fitted_to_size(chart, area, uv)?, method)
+            }
+        })
+    }
 }
