@@ -7,6 +7,7 @@
 use crate::evaluate::Bvh;
 use crate::grid::{GridPoint, orientation};
 use crate::vec3::BoundingBox;
+use num_bigint::BigInt;
 
 /// What is wrong with loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -50,7 +51,7 @@ pub fn check(loops: &[Vec<GridPoint>]) -> Option<Wrong> {
     if let Some(pair) = crossing(loops) {
         return Some(Wrong::Crossing(pair));
     }
-    let turning_left: Vec<usize> = (0..loops.len()).filter(|i| doubled_area(&loops[*i]) > 0.0).collect();
+    let turning_left: Vec<usize> = (0..loops.len()).filter(|i| doubled_area(&loops[*i]) > BigInt::from(0)).collect();
     let &[outer] = &turning_left[..] else {
         // The second that turns left; where none does, the first loop.
         return Some(Wrong::Outer(turning_left.get(1).copied().unwrap_or(0)));
@@ -70,11 +71,11 @@ fn is_misplaced(loops: &[Vec<GridPoint>], outer: usize, hole: usize) -> bool {
     others.any(|other| is_inside(point, &loops[other]))
 }
 
-/// Twice the signed area, to rounding; its sign is that of simple polygons of any area above rounding.
-fn doubled_area(polygon: &[GridPoint]) -> f64 {
+/// Twice the signed area in grid units squared, exactly.
+fn doubled_area(polygon: &[GridPoint]) -> BigInt {
     let origin = polygon.first().copied().unwrap_or_default();
     let next = polygon.iter().cycle().skip(1);
-    polygon.iter().zip(next).map(|(p, q)| orientation(origin, *p, *q) as f64).sum()
+    polygon.iter().zip(next).map(|(p, q)| BigInt::from(orientation(origin, *p, *q))).sum()
 }
 
 /// The first two sides that share a point other than the end that neighbours have in common.

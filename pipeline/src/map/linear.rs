@@ -1,4 +1,4 @@
-//! Linear map: chart -> P1 map of the disk that does not fold.
+//! Linear map: chart -> P1 map that does not fold.
 //!
 //! The harmonic map by linear elements (cotangent weights) may fold where an edge has opposite angles adding up to
 //! more than pi: its weight is negative. Every triangle is tested exactly, on the numbers that are kept. If any is
@@ -7,6 +7,8 @@
 //! inside a convex boundary (Tutte 1963, doi 10.1112/plms/s3-13.1.743; Floater 1997,
 //! doi 10.1016/S0167-8396(96)00031-3). If rounding still folds something, mean value weights are tried, in a system
 //! of their own. If that folds too, the chart is too distorted for doubles and must be split.
+//!
+//! Inside a boundary that is not convex, as natural ones are, there is no such theorem: there a map is what passes the test.
 //!
 //! Guarantees: in a [`LinearMap`] every triangle, those of virtual fans included, turns left, exactly.
 

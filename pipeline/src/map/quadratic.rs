@@ -1,6 +1,6 @@
 //! Quadratic map: the harmonic map by P2 finite elements.
 //!
-//! u and v solve two Laplace problems over the chart (holes closed by virtual fans) by 6-node triangles, with the
+//! u and v solve two Laplace problems over the chart (holes closed by virtual fans, or open) by 6-node triangles, with the
 //! nodes of the outer loop prescribed ([`super::harmonic`], for quadratic elements). The map minimises the Dirichlet energy among all quadratic maps with these boundary
 //! values; it need not be valid, and typically a few triangles in a thousand are not.
 

@@ -125,7 +125,7 @@ impl Cutter<'_> {
         if is_short && disk.conformal_p99(chart) <= ROUND {
             return Ok(None);
         }
-        let Some(is_left) = left_of_hole(&disk) else { return Ok(None) };
+        let Some(is_left) = left_of_hole(chart, &disk) else { return Ok(None) };
         let halves = decompose::halve(chart, &is_left, decompose, self.monitor)?;
         if halves.len() != 2 {
             return Ok(None);
@@ -219,7 +219,7 @@ impl Cutter<'_> {
 
     /// The chart cut once: through its first hole, or where the area scale changes. None for a single triangle.
     fn halves(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Chart>>, decompose::Error> {
-        match left_of_hole(map) {
+        match left_of_hole(chart, map) {
             Some(is_left) => decompose::halve(chart, &is_left, &self.settings.decompose, self.monitor).map(Some),
             None => {
                 let scales = distortion::log_scales(chart, &map.certified_start);
@@ -229,12 +229,16 @@ impl Cutter<'_> {
     }
 }
 
-/// Per triangle, whether it lies left of a line through the middle of the disk and that of the first hole, if there is
-/// one.
-fn left_of_hole(map: &Maps) -> Option<Vec<bool>> {
+/// Per triangle, whether it lies left of a line through the origin of the plane and the middle of the first hole, if there
+/// is one.
+fn left_of_hole(chart: &Chart, map: &Maps) -> Option<Vec<bool>> {
     let start = &map.certified_start;
-    let centre = start.certificate().hole_centres.first()?.uv();
     let node = |n: u32| start.map().nodes[n as usize].uv();
+    let hole = chart.holes().first()?;
+    let sum = hole.iter().map(|h| node(chart.from(*h).0)).fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]);
+    let mean = sum.map(|c| c / hole.len() as f64);
+    // On the disk a point is known that sees all of the hole.
+    let centre = start.certificate().hole_centres.first().map_or(mean, |c| c.uv());
     let along = if centre == [0.0; 2] { [1.0, 0.0] } else { centre };
     let is_left = |cell: &[u32; 6]| {
         let sum = cell[..3].iter().map(|n| node(*n)).fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]);
