@@ -12,7 +12,7 @@ use crate::fem::dofs::Dofs;
 use crate::fem::sparse;
 use crate::mesh::TriangleShape;
 use crate::monitor::Monitor;
-use crate::vec3::{Vec3, norm, sub};
+use crate::vec3::{Vec3, cross, dot, norm, sub};
 
 /// The least squares conformal map of `chart`; none where it is not one-to-one.
 ///
@@ -41,32 +41,29 @@ use crate::vec3::{Vec3, norm, sub};
 pub fn conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Option<Natural>, sparse::Error> {
     let nodes = chart.vertices().len() + chart.edges().len();
     // The four parts of a triangle have its shape, and so its matrix.
-    let uv = least_squares(chart, far_apart(chart), nodes, chart.cells().flat_map(similar), 4, monitor)?;
+    let uv = least_squares(chart, nodes, chart.cells().flat_map(similar), 4, monitor)?;
     Ok(certified(chart, &uv))
 }
 
-/// The least squares conformal map of the triangles of `chart` as they are: the uv of its vertices. It need not be
-/// one-to-one: coarse needles fold. It takes a fraction of the time of [`conformal`].
+/// As [`conformal`], of the triangles of `chart` as they are: the uv of its vertices, one-to-one or not.
 ///
 /// # Errors
 /// The system cannot be solved, or interrupted.
 pub fn conformal_by_corners(chart: &Chart, monitor: &dyn Monitor) -> Result<Vec<[f64; 2]>, sparse::Error> {
     let triangles = chart.triangles().iter().map(|t| t.map(|v| v.index()));
-    least_squares(chart, extremes(chart), chart.vertices().len(), triangles, 1, monitor)
+    least_squares(chart, chart.vertices().len(), triangles, 1, monitor)
 }
 
 /// The least squares conformal map of triangles between `nodes` nodes, `per_triangle` of them for each of the chart's and
 /// similar to it, corner by corner.
-///
-/// The two nodes `held` decide which of the maps that are nearly conformal it is, as they keep their places.
 fn least_squares(
     chart: &Chart,
-    held: [usize; 2],
     nodes: usize,
     triangles: impl Iterator<Item = [usize; 3]>,
     per_triangle: usize,
     monitor: &dyn Monitor,
 ) -> Result<Vec<[f64; 2]>, sparse::Error> {
+    let held = far_apart(chart);
     // u and v of each node are scalars of their own, side by side; those of the two nodes that are held are prescribed.
     let free = (0..nodes).filter(|n| !held.contains(n)).flat_map(scalars);
     let dofs = Dofs::new(2 * nodes, free.map(|s| s as u32).collect());
@@ -81,6 +78,85 @@ fn least_squares(
     }
     let solution = system.solve(&pattern.analyse()?, monitor)?;
     Ok((0..nodes).map(|n| scalars(n).map(|s| solution[s][0])).collect())
+}
+
+/// The spectral conformal map of the triangles of `chart` as they are: the uv of its vertices. Of all maps whose boundary is
+/// spread as far (in the mean square along it) it has the least energy, so that no vertices need be held (Mullen, Tong, Alliez
+/// and Desbrun 2008, doi 10.1111/j.1467-8659.2008.01289.x): it is an eigenvector, found by inverse iteration. It need not be
+/// one-to-one: coarse needles fold. It takes a fraction of the time of [`conformal`].
+///
+/// # Errors
+/// The system cannot be solved, or interrupted.
+pub fn spectral_conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Vec<[f64; 2]>, sparse::Error> {
+    let vertices = chart.vertices().len();
+    let dofs = Dofs::new(2 * vertices, (0..2 * vertices as u32).collect());
+    let triangles = chart.triangles().iter().map(|t| part_scalars(t.map(|v| v.index())));
+    let pattern = dofs.pattern(triangles);
+    let mass = boundary_mass(chart);
+    let mut matrix = pattern.zeros();
+    for (f, shape) in chart.shapes().iter().enumerate() {
+        pattern.add(&mut matrix, f, &element(shape));
+    }
+    for (scalar, at) in pattern.diagonal().enumerate() {
+        matrix[at] += SHIFT * mass[scalar / 2];
+    }
+    let analysis = pattern.analyse()?;
+    let factor = analysis.factorise(&matrix, monitor)?;
+    let mut x = first_guess(chart);
+    for _ in 0..ITERATIONS {
+        x = (0..2 * vertices).map(|scalar| mass[scalar / 2] * x[scalar]).collect();
+        factor.solve(&mut x, 1);
+        centred_and_scaled(&mut x, &mass);
+    }
+    Ok((0..vertices).map(|v| scalars(v).map(|s| x[s])).collect())
+}
+
+/// How much of the boundary's mass is added to the matrix, which is singular without: moving a map costs no energy, nor does
+/// turning it where the chart is developable. Small beside the energies that are told apart, and large enough that
+/// rounding does not decide.
+const SHIFT: f64 = 1e-6;
+
+/// Steps of inverse iteration. Each brings the map nearer by the ratio of the two least energies, one half or less mostly.
+const ITERATIONS: usize = 24;
+
+/// Per vertex, its share of the length of all loops.
+fn boundary_mass(chart: &Chart) -> Vec<f64> {
+    let loops = || chart.outer().iter().chain(chart.holes().iter().flatten());
+    let length: f64 = loops().map(|h| chart.length(*h)).sum();
+    let mut mass = vec![0.0; chart.vertices().len()];
+    for h in loops() {
+        for end in [*h, h.next()] {
+            mass[chart.from(end).index()] += 0.5 * chart.length(*h) / length;
+        }
+    }
+    mass
+}
+
+/// Where inverse iteration begins: the vertices seen along the direction in which the boundary is spread least, or nearly
+/// so. (Any guess would do that is not at right angles to the answer.)
+fn first_guess(chart: &Chart) -> Vec<f64> {
+    let [first, second] = extremes(chart).map(|v| chart.points()[v]);
+    let along = sub(second, first);
+    let mut normal = [0.0; 3];
+    for f in 0..chart.triangles().len() {
+        let [a, b, c] = chart.corners(f);
+        let of_face = cross(sub(b, a), sub(c, a));
+        normal = [0, 1, 2].map(|k| normal[k] + of_face[k]);
+    }
+    let across = cross(normal, along);
+    // Of comparable size, whatever the unit; zero for a boundary that is seen from no side, and then the other serves.
+    let unit = |v: Vec3| v.map(|c| c / norm(v).max(f64::MIN_POSITIVE));
+    let (along, across) = (unit(along), unit(across));
+    chart.points().iter().flat_map(|p| [dot(sub(*p, first), along), dot(sub(*p, first), across)]).collect()
+}
+
+/// Moves a map so that the mean of its boundary is the origin, and scales it so that the mean square there is one.
+fn centred_and_scaled(x: &mut [f64], mass: &[f64]) {
+    let mean = [0, 1].map(|k| mass.iter().enumerate().map(|(v, m)| m * x[2 * v + k]).sum::<f64>());
+    x.iter_mut().enumerate().for_each(|(scalar, c)| *c -= mean[scalar % 2]);
+    let square: f64 = x.iter().enumerate().map(|(scalar, c)| mass[scalar / 2] * c * c).sum();
+    let scale = square.sqrt().recip();
+    x.iter_mut().for_each(|c| *c *= scale);
 }
 
 /// The numbers of u and v at a node.

@@ -24,7 +24,7 @@ use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, singular_ratio};
 use crate::measure::quantiles::{Weighted, quantiles};
 use crate::monitor::{Interrupted, Monitor};
-pub use conformal::{conformal, conformal_by_corners};
+pub use conformal::{conformal, conformal_by_corners, spectral_conformal};
 pub use projection::projection;
 pub use start::{NaturalStart, NoNatural, natural_start};
 

@@ -7,7 +7,7 @@
 
 use super::boundary_first::boundary_first;
 use super::projection::projected;
-use super::{EVEN, STEEP, conformal_by_corners, fitted_to_size};
+use super::{EVEN, STEEP, conformal_by_corners, fitted_to_size, spectral_conformal};
 use crate::atlas::Chart;
 use crate::certify::{self, CertifiedMap, PlanarMap, prove};
 use crate::fem::sparse;
@@ -68,7 +68,7 @@ pub enum NoNatural {
 }
 
 /// Finds the natural boundary of `chart`, and a valid map inside it: by boundary first flattening, where it has no holes;
-/// else, or where that fails, by the least squares conformal map of its vertices; else, for what is nearly a plane, by the
+/// else, or where that fails, by the spectral and the least squares conformal map of its vertices; else, for what is nearly a plane, by the
 /// projection. None of them scales areas by more than 100, or `max_area_ratio` where that is
 /// less.
 ///
@@ -102,11 +102,9 @@ pub fn natural_start(
     let search = Search { chart, filled: FilledChart::open(chart), most: EVEN.min(max_area_ratio), monitor };
     let mut why = NoNatural::Unsolvable;
     // What is told is why the best one failed.
-    for (rank, candidate) in
-        [Candidate::BoundaryFirst, Candidate::LeastSquares, Candidate::Projection].iter().enumerate()
-    {
+    for (rank, candidate) in Candidate::ALL.into_iter().enumerate() {
         Checkpoint::new(monitor).end()?;
-        match search.by(*candidate)? {
+        match search.by(candidate)? {
             Ok(start) => return Ok(Ok(start)),
             Err(Some(reason)) if rank == 0 || why == NoNatural::Unsolvable => why = reason,
             Err(_) => {}
@@ -120,10 +118,17 @@ pub fn natural_start(
 enum Candidate {
     /// Boundary first flattening: for charts without holes.
     BoundaryFirst,
-    /// The least squares conformal map of the vertices.
+    /// The spectral conformal map of the vertices.
+    Spectral,
+    /// The least squares conformal map of the vertices, two of them held. Of curved charts with holes it may be one-to-one
+    /// where the other is not: beetle_11_holes.
     LeastSquares,
     /// The projection along the mean of the normals.
     Projection,
+}
+
+impl Candidate {
+    const ALL: [Self; 4] = [Self::BoundaryFirst, Self::Spectral, Self::LeastSquares, Self::Projection];
 }
 
 /// A start, or why there is none by some candidate; nothing where that does not apply.
@@ -144,6 +149,9 @@ impl Search<'_> {
             Candidate::BoundaryFirst if !chart.holes().is_empty() => return Ok(Err(None)),
             Candidate::BoundaryFirst => {
                 boundary_first(chart, filled, *monitor).map(|found| found.map(Places::Boundary))
+            }
+            Candidate::Spectral => {
+                spectral_conformal(chart, *monitor).map(|uv| Some(Places::All(uv, Method::Conformal)))
             }
             Candidate::LeastSquares => {
                 conformal_by_corners(chart, *monitor).map(|uv| Some(Places::All(uv, Method::Conformal)))
