@@ -1,11 +1,17 @@
 """verify_vtu.py [--break] RESULT...: opens surface.vtu, param.vtu, seams.vtp and atlas.vtm of each result with the
-real VTK, and proves from surface.vtu alone that every curved parametric triangle is valid.
+real VTK, and proves from surface.vtu that every curved parametric triangle is valid, and that the boundary of every
+chart is that of a disk with holes: then its map is one-to-one.
 
 This is no translation of planish's own proof: the jacobian is expanded into the monomials of a polynomial in two
 variables with rational coefficients, and its minimum over the closed triangle is found from stationary points.
 
+Boundaries of chords are proven to be simple polygons, all pairs of sides compared, one of them turning left. Those with
+arcs are proven to turn about a point, by the angle under which it sees them: the origin, and for holes the centres in
+report.json.
+
 --break moves one node of the first triangle before the proof: then it must fail.
 """
+import json
 import os
 import sys
 import tempfile
@@ -145,6 +151,101 @@ def surely_positive(nodes):
     return values > noise
 
 
+def boundary_loops(cells):
+    """Closed loops of (vertex, middle) of the edges that one cell has."""
+    sides = {}
+    for cell in cells.tolist():
+        for k in range(3):
+            sides[cell[k], cell[(k + 1) % 3]] = cell[3 + k]
+    after = {a: (mid, b) for (a, b), mid in sides.items() if (b, a) not in sides}
+    loops = []
+    while after:
+        start = node = min(after)
+        loop = []
+        while node in after:
+            mid, end = after.pop(node)
+            loop.append((node, mid))
+            node = end
+        assert node == start, "a loop of the boundary does not close"
+        loops.append(loop)
+    return loops
+
+
+def exact(point):
+    return Fraction(float(point[0])), Fraction(float(point[1]))
+
+
+def turn(a, b, c):
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def segments_meet(a, b, c, d):
+    """Whether two closed segments have a point in common, their boxes overlapping."""
+    of_cd, of_ab = (turn(a, b, c), turn(a, b, d)), (turn(c, d, a), turn(c, d, b))
+    return not any(x * y > 0 for x, y in (of_cd, of_ab))
+
+
+def polygons_are_simple(polygons):
+    """No two sides of closed polygons meet but neighbours, at their corner."""
+    starts = numpy.concatenate(polygons)
+    follows, base = [], 0
+    for polygon in polygons:
+        follows += [base + (i + 1) % len(polygon) for i in range(len(polygon))]
+        base += len(polygon)
+    ends = starts[follows]
+    low, high = numpy.minimum(starts, ends), numpy.maximum(starts, ends)
+    for i in range(len(starts) - 1):
+        overlap = ((low[i + 1:] <= high[i]) & (low[i] <= high[i + 1:])).all(1)
+        for j in i + 1 + numpy.flatnonzero(overlap):
+            a, b, c, d = (exact(p) for p in (starts[i], ends[i], starts[j], ends[j]))
+            if follows[i] == j or follows[j] == i:
+                # Neighbours meet elsewhere only where one runs back along the other.
+                corner, p, q = (b, a, d) if follows[i] == j else (a, b, c)
+                along = (p[0] - corner[0]) * (q[0] - corner[0]) + (p[1] - corner[1]) * (q[1] - corner[1])
+                if turn(corner, p, q) == 0 and along > 0:
+                    return False
+            elif segments_meet(a, b, c, d):
+                return False
+    return True
+
+
+def turns_about(arcs, centre, sign):
+    """Whether the angle under which a point is seen only grows (or falls) along quadratic arcs, by one turn in all."""
+    crossings = 0
+    for p, m, q in arcs:
+        p, m, q = (tuple(v[k] - centre[k] for k in range(2)) for v in (p, m, q))
+        c = tuple(2 * m[k] - (p[k] + q[k]) / 2 for k in range(2))
+        cross = lambda s, t: s[0] * t[1] - s[1] * t[0]
+        # x(t) x x'(t) / 2 has the Bernstein coefficients p x c, (p x q) / 2, c x q.
+        if min(sign * cross(p, c), sign * cross(p, q), sign * cross(c, q)) <= 0:
+            return False
+        crossings += (p[1] < 0) != (q[1] < 0)
+    return crossings == 2
+
+
+def boundary_is_proven(cells, uv, centres):
+    loops = boundary_loops(cells)
+    arcs = [[tuple(exact(uv[n]) for n in (v, mid, loop[(i + 1) % len(loop)][0])) for i, (v, mid) in enumerate(loop)]
+            for loop in loops]
+    if all(m[k] * 2 == p[k] + q[k] for loop in arcs for p, m, q in loop for k in range(2)):
+        polygons = [numpy.array([uv[v] for v, _ in loop]) for loop in loops]
+        areas = [sum(p[0] * q[1] - p[1] * q[0] for p, _, q in loop) for loop in arcs]
+        return sum(area > 0 for area in areas) == 1 and polygons_are_simple(polygons)
+    origin = (Fraction(0), Fraction(0))
+    outer = [loop for loop in arcs if turns_about(loop, origin, 1)]
+    holes = [loop for loop in arcs if not any(loop is o for o in outer)]
+    return len(outer) == 1 and all(any(turns_about(loop, exact(c), -1) for c in centres) for loop in holes)
+
+
+def check_the_checks():
+    """What would prove anything proves nothing."""
+    square = numpy.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    inside, across = 0.25 + 0.5 * square[::-1], 0.5 + 0.75 * square[::-1]
+    assert polygons_are_simple([square, inside]) and not polygons_are_simple([square, across])
+    assert not polygons_are_simple([square[[0, 2, 1, 3]]]), "a bow tie"
+    assert not polygons_are_simple([square, square[::-1] - [1.0, 0.0]]), "a side in common"
+
+
 def verify(folder, broken):
     messages = []
     surface, param = (read(f"{folder}/{name}", messages) for name in ("surface.vtu", "param.vtu"))
@@ -165,11 +266,20 @@ def verify(folder, broken):
         if least(jacobian(nodes[i].tolist())) <= 0:
             print(f"{folder}: invalid triangle {i}")
             return False
+    charts = vtk_to_numpy(surface.GetCellData().GetArray("chart"))
+    with open(f"{folder}/report.json", encoding="utf-8") as report:
+        report = json.load(report)
+    for chart in report["charts"]:
+        centres = chart["certificate"]["hole_centres"]
+        if not boundary_is_proven(cells[charts == chart["id"]], uv, centres):
+            print(f"{folder}: the boundary of chart {chart['id']} is not that of a disk with holes")
+            return False
     print(f"ok {folder}: {len(cells)} valid triangles, {len(doubtful)} of them decided in rationals")
     return True
 
 
 def main():
+    check_the_checks()
     arguments = sys.argv[1:]
     broken = "--break" in arguments
     folders = [a for a in arguments if a != "--break"]
