@@ -34,7 +34,7 @@ fn a_plate_keeps_its_shape_by_default_and_is_mapped_to_the_disk_on_demand() {
     assert_eq!(out.run(&[&fixture(name)], &["-q"]).code, Some(0));
     let report = out.report(name);
     let (chart, argument) = only_chart(&report);
-    assert_eq!((report.settings.boundary, chart.boundary.shape), (Boundary::Natural, Boundary::Natural));
+    assert_eq!((report.settings.boundary, chart.boundary.shape), (Some(Boundary::Natural), Boundary::Natural));
     assert_eq!((argument, chart.certificate.boundary.holes, chart.loops), ("simple", 3, 4));
     assert_eq!((chart.linear.method.as_str(), &chart.boundary.reason), ("conformal", &None));
     is_proven_again(&out, name);
@@ -45,7 +45,7 @@ fn a_plate_keeps_its_shape_by_default_and_is_mapped_to_the_disk_on_demand() {
     let (disk, argument) = only_chart(&on_disk);
     assert_eq!(
         (on_disk.settings.boundary, disk.boundary.shape, argument),
-        (Boundary::Circle, Boundary::Circle, "star_shaped")
+        (Some(Boundary::Circle), Boundary::Circle, "star_shaped")
     );
     assert_eq!(disk.boundary.reason, None, "nobody asked for another");
     assert!(chart.distortion.conformal_p99 < disk.distortion.conformal_p99);

@@ -153,6 +153,41 @@ fn another_argument_than_that_of_the_proof_is_found() {
     assert!(ended.code == Some(1) && ended.err.contains("something else than the proof"), "{}", ended.err);
 }
 
+#[test]
+fn arcs_that_are_called_a_natural_boundary_are_found() {
+    let name = "disk_with_holes.stl";
+    let out = certified_on_disk(name);
+    reword(&out, name, "\"shape\": \"circle\"", "\"shape\": \"natural\"");
+    let ended = check(&out, name);
+    assert!(ended.code == Some(1) && ended.err.contains("does not consist of chords"), "{}", ended.err);
+}
+
+#[test]
+fn what_an_older_planish_made_is_told_and_made_again() {
+    let name = "disk.stl";
+    let out = certified(name);
+    reword(&out, name, "    \"boundary\": \"natural\",\n", "");
+    let ended = check(&out, name);
+    assert!(ended.code == Some(1) && ended.err.contains("an older planish made it"), "{}", ended.err);
+    let again = out.run(&[&fixture(name)], &[]);
+    assert!(again.code == Some(0) && !again.out.contains("up to date"), "{}", again.out);
+    assert_eq!(check(&out, name).code, Some(0));
+}
+
+#[test]
+fn a_result_that_cannot_be_handed_to_a_mesher_is_proven_all_the_same() {
+    // So small that triangles have no normal in doubles.
+    let small = planish_core::shapes::disk(4);
+    let points = small.points().iter().map(|p| p.map(|c| c * 1e-120)).collect();
+    let small = planish_core::mesh::TriangleSoup::new(points, small.triangles().to_vec()).expect("sound");
+    let (name, out) = ("small.obj", Out::new());
+    let (ended, report) = out.run_bytes(name, &obj(&small));
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+    assert!(report.hand_off.is_some_and(|h| h.failure.is_some()), "the test has lost its sense");
+    let ended = check(&out, name);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+}
+
 /// Changes the report of a result as text.
 fn reword(out: &Out, name: &str, from: &str, to: &str) {
     let text = String::from_utf8(out.read(name, "report.json")).expect("UTF-8");

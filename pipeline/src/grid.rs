@@ -7,7 +7,7 @@
 /// Grid units per unit of length: 2^53.
 pub const UNITS: f64 = 9_007_199_254_740_992.0;
 
-/// Coordinates saturate here (|u| <= 2); a valid map of the unit disk never comes near.
+/// Coordinates saturate here (|u| <= 2); a valid map never comes near.
 const LIMIT: i64 = 1 << 54;
 
 /// A point of the parametric plane, in units of 2^-53.

@@ -82,9 +82,9 @@ pub struct Input {
 pub struct ResultSettings {
     /// Order of the elements.
     pub order: u8,
-    /// Boundary of charts in the plane; results that say nothing have the circle.
-    #[serde(default = "circle")]
-    pub boundary: settings::Boundary,
+    /// Boundary of charts in the plane; none in results of older versions, which are out of date.
+    #[serde(default)]
+    pub boundary: Option<settings::Boundary>,
     /// Tolerance for cracks.
     pub weld: f64,
     /// Dihedral angle of feature edges, in degrees; null: off.
@@ -109,7 +109,7 @@ impl From<&Settings> for ResultSettings {
     fn from(settings: &Settings) -> Self {
         Self {
             order: if settings.order == Order::Linear { 1 } else { 2 },
-            boundary: settings.boundary,
+            boundary: Some(settings.boundary),
             weld: settings.weld,
             feature_angle: settings.feature_angle,
             strict_disks: settings.strict_disks,
@@ -126,7 +126,7 @@ impl ResultSettings {
     pub fn applied_to(&self, settings: Settings) -> Settings {
         Settings {
             order: if self.order == 1 { Order::Linear } else { Order::Quadratic },
-            boundary: self.boundary,
+            boundary: self.boundary.unwrap_or(settings.boundary),
             weld: self.weld,
             feature_angle: self.feature_angle,
             strict_disks: self.strict_disks,

@@ -13,11 +13,12 @@ use crate::outcome::{Reason, Status};
 use crate::output::ledger;
 use crate::report::{self, ChartReport, Output, Report, certificate, chart_checksum};
 use crate::result_files;
-use crate::settings::ExportTarget;
+use crate::settings::{Boundary, ExportTarget};
 use crate::stages::guard;
 use planish_core::certify::{self, PlanarMap, prove};
 use planish_core::grid::GridPoint;
 use planish_core::measure::distortion::CellFields;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The files that every certified result has.
@@ -103,6 +104,10 @@ fn check_one(folder: &Path) -> Findings {
         Err(finding) => return Findings::only(finding),
     };
     let mut found = Findings::default();
+    if report.settings.boundary.is_none() {
+        let older = "an older planish made it, which says nothing of boundaries: run it again";
+        return Findings::only(file(result_files::REPORT, older));
+    }
     found.wrong.extend(check_outputs(folder, &report));
     match read_grid(folder, result_files::SURFACE) {
         Ok(grid) => {
@@ -159,9 +164,9 @@ fn expected_files(report: &Report) -> Vec<&'static str> {
     let has_failed = report.hand_off.as_ref().is_some_and(|hand_off| hand_off.failure.is_some());
     if is_asked_for && !has_failed {
         expected.extend(HANDED_OFF);
-    }
-    if report.hand_off.as_ref().is_some_and(|hand_off| hand_off.enlarged != 1.0) {
-        expected.push(result_files::ENLARGED_MSH);
+        if report.hand_off.as_ref().is_some_and(|hand_off| hand_off.enlarged != 1.0) {
+            expected.push(result_files::ENLARGED_MSH);
+        }
     }
     expected
 }
@@ -238,6 +243,9 @@ fn check_chart(grid: &Grid, index: usize, chart: &ChartReport) -> Result<String,
     let map = planar_map(grid, &cells, chart).map_err(|problem| wrong(&problem))?;
     let checksum = chart_checksum(&map);
     let proof = prove(map).map_err(|e| unproven(grid, &cells, id, e))?;
+    if chart.boundary.shape == Boundary::Natural && !is_in_chords(grid, &cells) {
+        return Err(wrong("its boundary does not consist of chords, as natural ones do"));
+    }
     if checksum != chart.certificate.checksum {
         return Err(wrong("the map is one-to-one, but not the one that was certified (checksum differs)"));
     }
@@ -254,6 +262,21 @@ fn check_chart(grid: &Grid, index: usize, chart: &ChartReport) -> Result<String,
         c.holes,
         &checksum[..16],
     ))
+}
+
+/// Whether the middles of all edges that one of the cells has lie in the middle of its ends, exactly.
+fn is_in_chords(grid: &Grid, cells: &[usize]) -> bool {
+    let mut edges: BTreeMap<[u64; 2], (u64, usize)> = BTreeMap::new();
+    for cell in cells.iter().map(|c| grid.cells[*c].map(u64::from)) {
+        for k in 0..3 {
+            let (a, b) = (cell[k], cell[(k + 1) % 3]);
+            edges.entry([a.min(b), a.max(b)]).or_insert((cell[3 + k], 0)).1 += 1;
+        }
+    }
+    let uv = |node: u64| grid.uv[node as usize];
+    // Sums and halves of multiples of 2^-52 below 2 are exact.
+    let is_middle = |([a, b], mid): ([u64; 2], u64)| (0..2).all(|k| 2.0 * uv(mid)[k] == uv(a)[k] + uv(b)[k]);
+    edges.into_iter().filter(|(_, (_, count))| *count == 1).all(|(ends, (mid, _))| is_middle((ends, mid)))
 }
 
 /// The map of the given cells, with its points numbered from the first one on.

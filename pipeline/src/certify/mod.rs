@@ -13,7 +13,7 @@
 //!
 //! *Why.* Off the image of the boundary the number N(q) of preimages of q equals its winding number W(q) = [q
 //! inside the outer loop] - sum over k of [q inside hole k], as every preimage counts +1. So N <= 1, and holes
-//! neither overlap nor leave the disk. Near any point the map has local degree at least 1; two points with the
+//! neither overlap nor leave the outer loop. Near any point the map has local degree at least 1; two points with the
 //! same image would give N >= 2 nearby, or N >= 1 > W beside a loop: a contradiction. (c) and (d) are the cheap test; (e)
 //! asks for no shape ([`curves`] has how it is decided): simple loops have winding numbers of +1 and -1 about what they
 //! enclose, and as W = N is nowhere negative, holes lie inside the outer loop, and none inside another.

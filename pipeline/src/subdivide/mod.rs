@@ -281,11 +281,14 @@ enum Proven<'a> {
 }
 
 impl Proven<'_> {
-    /// Whether what was proven of its boundary is that it is simple, and not that it can be seen from a point.
-    fn is_polygon(&self) -> bool {
+    /// Whether the polygon through the nodes of its boundary is simple by what was proven: not where loops of arcs were
+    /// proven to be simple as they are bent.
+    fn is_proven_as_polygon(&self) -> bool {
         match self {
             Self::Straight(_) => true,
-            Self::Quadratic(map) => map.certificate().boundary == BoundaryArgument::Simple,
+            Self::Quadratic(map) => {
+                map.certificate().boundary == BoundaryArgument::StarShaped || boundary_is_in_chords(map.map())
+            }
         }
     }
 
@@ -317,9 +320,11 @@ fn split(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<Sp
         let failed = match refine::refine(refine::DEPTH, atlas, &current, &mut nodes, &mut split) {
             Ok(refined) => {
                 // The polygon that was proven may have got more nodes, which are rounded.
-                let is_polygon = |c: &usize| chosen[*c].is_polygon();
-                let touches = |c: &usize| touches_itself(&split[*c], ChartId::at(*c), network, &nodes);
-                let touching: Vec<usize> = (0..by.len()).filter(is_polygon).filter(touches).collect();
+                let touches = |c: &usize| {
+                    let is_proven = chosen[*c].is_proven_as_polygon();
+                    touches_itself(&split[*c], ChartId::at(*c), is_proven, network, &nodes)
+                };
+                let touching: Vec<usize> = (0..by.len()).filter(touches).collect();
                 if touching.is_empty() {
                     return Ok(Split { nodes, charts: split, by, refined });
                 }
@@ -351,11 +356,26 @@ fn split(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<Sp
     }
 }
 
-/// Whether the boundary of a chart whose curves were halved beyond the middles of edges crosses or touches itself in the
-/// plane. What was proven is the polygon through these; new nodes are rounded to the grid.
-fn touches_itself(chart: &LinearChart, id: ChartId, network: &SeamNetwork, nodes: &Nodes) -> bool {
+/// Whether all nodes in the middle of edges that one cell has lie on chords.
+fn boundary_is_in_chords(map: &PlanarMap) -> bool {
+    let mut count: BTreeMap<u32, usize> = BTreeMap::new();
+    map.cells.iter().flat_map(|cell| &cell[3..]).for_each(|mid| *count.entry(*mid).or_default() += 1);
+    let is_straight = |cell: &[u32; 6]| {
+        (0..3).all(|k| {
+            let [from, mid, to] = [cell[k], cell[3 + k], cell[(k + 1) % 3]];
+            let [p, m, q] = [from, mid, to].map(|n| map.nodes[n as usize]);
+            count[&mid] > 1 || p.midpoint(q) == m
+        })
+    };
+    map.cells.iter().all(is_straight)
+}
+
+/// Whether the boundary of a chart crosses or touches itself in the plane. Where it `is_proven` that the polygon through
+/// vertices and middles of edges does not, only curves that were halved further are looked at: new nodes are rounded to the
+/// grid.
+fn touches_itself(chart: &LinearChart, id: ChartId, is_proven: bool, network: &SeamNetwork, nodes: &Nodes) -> bool {
     let curve = |p: &Passage| &network.curves()[p.curve.index()];
-    if !network.loops(id).iter().flatten().any(|p| is_halved(curve(p), nodes)) {
+    if is_proven && !network.loops(id).iter().flatten().any(|p| is_halved(curve(p), nodes)) {
         return false;
     }
     let uv_of: BTreeMap<u32, GridPoint> = chart.nodes.iter().copied().zip(chart.uv.iter().copied()).collect();

@@ -1,6 +1,5 @@
 //! Where charts lie in param.vtu: beside each other, each in its own size.
 
-use etagere::{AtlasAllocator, size2};
 use planish_core::CertifiedChart;
 
 /// The place of a chart: its uv, times `scale`, moved by `shift`.
@@ -21,30 +20,35 @@ impl Placement {
     }
 }
 
-/// The side of the square that is packed, in units of its own: positions are multiples of its share of the square.
-const SIDE: i32 = 16_384;
-
 /// The gap between charts, as a share of the mean side of their boxes.
 const GAP: f64 = 0.1;
 
-/// How often the square is tried in a larger size, and by how much. After all of them it has 300 times the side of a square
-/// of the charts' area, and a strip of any length that is cut into charts lies in it.
-const TRIES: i32 = 60;
-const GROWTH: f64 = 1.1;
-
-/// Packs the charts of an atlas, the highest first, in rows.
+/// Packs the charts of an atlas in rows, the highest first (next fit by decreasing height: Coffman, Garey, Johnson and Tarjan
+/// 1980, *Performance bounds for level-oriented two-dimensional packing algorithms*, doi 10.1137/0209062): for any number
+/// of charts at most about twice the area of their boxes.
 pub fn layout(charts: &[CertifiedChart]) -> Vec<Placement> {
     let boxes: Vec<ScaledBox> = charts.iter().map(ScaledBox::of).collect();
-    let mean = boxes.iter().map(ScaledBox::area).sum::<f64>().sqrt() / (boxes.len() as f64).sqrt();
+    let mean = (boxes.iter().map(ScaledBox::area).sum::<f64>() / boxes.len() as f64).sqrt();
     let gap = GAP * mean;
     let area: f64 = boxes.iter().map(|b| (b.size[0] + gap) * (b.size[1] + gap)).sum();
+    let widest = boxes.iter().map(|b| b.size[0]).fold(0.0, f64::max);
+    let width = area.sqrt().max(widest);
     let mut order: Vec<usize> = (0..boxes.len()).collect();
     order.sort_by(|a, b| boxes[*b].size[1].total_cmp(&boxes[*a].size[1]).then(a.cmp(b)));
-    let packed = (0..TRIES).find_map(|k| packed(&boxes, &order, gap, area.sqrt() * GROWTH.powi(k)));
-    let corners = packed.unwrap_or_else(|| in_a_row(&boxes, gap));
-    let place =
-        |(b, corner): (&ScaledBox, [f64; 2])| Placement { scale: b.scale, shift: [0, 1].map(|k| corner[k] - b.min[k]) };
-    boxes.iter().zip(corners).map(place).collect()
+    let mut places = vec![Placement { scale: 1.0, shift: [0.0; 2] }; boxes.len()];
+    // Where the next chart of the row lies, and how high the row is: as its first chart.
+    let (mut corner, mut height) = ([0.0; 2], 0.0);
+    for i in order {
+        let b = &boxes[i];
+        if corner[0] > 0.0 && corner[0] + b.size[0] > width {
+            corner = [0.0, corner[1] + height + gap];
+            height = 0.0;
+        }
+        height = b.size[1].max(height);
+        places[i] = Placement { scale: b.scale, shift: [0, 1].map(|k| corner[k] - b.min[k]) };
+        corner[0] += b.size[0] + gap;
+    }
+    places
 }
 
 /// A chart in its own size.
@@ -84,33 +88,6 @@ fn uv_scale(certified: &CertifiedChart) -> f64 {
     let in_plane = 0.5 * map.cells.iter().map(doubled).sum::<f64>();
     // Finite for any surface: sizes beyond doubles were refused.
     (0.5 * (in_space / in_plane).log2()).round().clamp(-1000.0, 1000.0).exp2()
-}
-
-/// The lower left corners of all boxes in a square with this side; none where they do not fit.
-fn packed(boxes: &[ScaledBox], order: &[usize], gap: f64, side: f64) -> Option<Vec<[f64; 2]>> {
-    let unit = side / f64::from(SIDE);
-    let mut square = AtlasAllocator::new(size2(SIDE, SIDE));
-    let mut corners = vec![[0.0; 2]; boxes.len()];
-    for &i in order {
-        let [width, height] = boxes[i].size.map(|s| ((s + gap) / unit).ceil());
-        if width > f64::from(SIDE) || height > f64::from(SIDE) {
-            return None;
-        }
-        let place = square.allocate(size2(width as i32, height as i32))?.rectangle.min;
-        corners[i] = [place.x, place.y].map(|c| f64::from(c) * unit);
-    }
-    Some(corners)
-}
-
-/// One beside the other, where nothing else was found.
-fn in_a_row(boxes: &[ScaledBox], gap: f64) -> Vec<[f64; 2]> {
-    let mut x = 0.0;
-    let mut corners = Vec::with_capacity(boxes.len());
-    for b in boxes {
-        corners.push([x, 0.0]);
-        x += b.size[0] + gap;
-    }
-    corners
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::fem::assembly::Assembly;
 use crate::fem::dofs::Dofs;
 use crate::fem::sparse;
 use crate::mesh::TriangleShape;
-use crate::monitor::Monitor;
+use crate::monitor::{Checkpoint, Monitor};
 use crate::vec3::{Vec3, cross, dot, norm, sub};
 
 /// The least squares conformal map of `chart`; none where it is not one-to-one.
@@ -100,13 +100,16 @@ pub fn spectral_conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Vec<[f
     for (scalar, at) in pattern.diagonal().enumerate() {
         matrix[at] += SHIFT * mass[scalar / 2];
     }
+    let checkpoint = Checkpoint::new(monitor);
     let analysis = pattern.analyse()?;
+    checkpoint.end()?;
     let factor = analysis.factorise(&matrix, monitor)?;
     let mut x = first_guess(chart);
     for _ in 0..ITERATIONS {
         x = (0..2 * vertices).map(|scalar| mass[scalar / 2] * x[scalar]).collect();
         factor.solve(&mut x, 1);
         centred_and_scaled(&mut x, &mass);
+        checkpoint.after(vertices)?;
     }
     Ok((0..vertices).map(|v| scalars(v).map(|s| x[s])).collect())
 }

@@ -109,6 +109,10 @@ pub fn natural_start(
             Err(Some(reason)) if rank == 0 || why == NoNatural::Unsolvable => why = reason,
             Err(_) => {}
         }
+        // What a conformal map shrinks by Liouville's equation every other shrinks, too.
+        if let (Candidate::BoundaryFirst, NoNatural::Uneven { .. }) = (candidate, why) {
+            break;
+        }
     }
     Ok(Err(why))
 }
