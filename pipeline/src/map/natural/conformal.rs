@@ -109,8 +109,10 @@ pub fn spectral_conformal(chart: &Chart, monitor: &dyn Monitor) -> Result<Vec<[f
         x = (0..2 * vertices).map(|scalar| mass[scalar / 2] * x[scalar]).collect();
         factor.solve(&mut x, 1);
         centred_and_scaled(&mut x, &mass);
-        checkpoint.after(vertices)?;
     }
+    // Nobody is asked while the factor is held: its memory is reserved.
+    drop(factor);
+    checkpoint.end()?;
     Ok((0..vertices).map(|v| scalars(v).map(|s| x[s])).collect())
 }
 
