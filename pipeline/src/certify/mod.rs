@@ -15,7 +15,7 @@
 //! inside the outer loop] - sum over k of [q inside hole k], as every preimage counts +1. So N <= 1, and holes
 //! neither overlap nor leave the outer loop. Near any point the map has local degree at least 1; two points with the
 //! same image would give N >= 2 nearby, or N >= 1 > W beside a loop: a contradiction. (c) and (d) are the cheap test; (e)
-//! asks for no shape ([`curves`] has how it is decided): simple loops have winding numbers of +1 and -1 about what they
+//! asks for no shape (`curves.rs` has how it is decided): simple loops have winding numbers of +1 and -1 about what they
 //! enclose, and as W = N is nowhere negative, holes lie inside the outer loop, and none inside another.
 //!
 //! Everything is decided on integers, exactly, from the cells and the uv of the nodes alone: [`prove`] knows
