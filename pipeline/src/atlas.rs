@@ -108,6 +108,11 @@ impl Chart {
         &self.holes
     }
 
+    /// The half-edges of all loops: those of the outer one, then those around holes.
+    pub fn boundary(&self) -> impl Iterator<Item = HalfEdgeId> {
+        self.outer.iter().chain(self.holes.iter().flatten()).copied()
+    }
+
     /// The vertex at which `h` begins.
     pub fn from(&self, h: HalfEdgeId) -> VertexId {
         self.triangles[h.face().index()][h.side()]

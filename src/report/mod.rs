@@ -101,10 +101,6 @@ pub struct ResultSettings {
     pub size: Option<f64>,
 }
 
-fn circle() -> settings::Boundary {
-    settings::Boundary::Circle
-}
-
 impl From<&Settings> for ResultSettings {
     fn from(settings: &Settings) -> Self {
         Self {
@@ -317,7 +313,7 @@ pub struct ChartBoundary {
 
 impl Default for ChartBoundary {
     fn default() -> Self {
-        Self { shape: circle(), reason: None, message: None }
+        Self { shape: settings::Boundary::Circle, reason: None, message: None }
     }
 }
 

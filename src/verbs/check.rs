@@ -18,7 +18,6 @@ use crate::stages::guard;
 use planish_core::certify::{self, PlanarMap, prove};
 use planish_core::grid::GridPoint;
 use planish_core::measure::distortion::CellFields;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The files that every certified result has.
@@ -243,7 +242,7 @@ fn check_chart(grid: &Grid, index: usize, chart: &ChartReport) -> Result<String,
     let map = planar_map(grid, &cells, chart).map_err(|problem| wrong(&problem))?;
     let checksum = chart_checksum(&map);
     let proof = prove(map).map_err(|e| unproven(grid, &cells, id, e))?;
-    if chart.boundary.shape == Boundary::Natural && !is_in_chords(grid, &cells) {
+    if chart.boundary.shape == Boundary::Natural && !proof.map().boundary_is_in_chords() {
         return Err(wrong("its boundary does not consist of chords, as natural ones do"));
     }
     if checksum != chart.certificate.checksum {
@@ -262,21 +261,6 @@ fn check_chart(grid: &Grid, index: usize, chart: &ChartReport) -> Result<String,
         c.holes,
         &checksum[..16],
     ))
-}
-
-/// Whether the middles of all edges that one of the cells has lie in the middle of its ends, exactly.
-fn is_in_chords(grid: &Grid, cells: &[usize]) -> bool {
-    let mut edges: BTreeMap<[u64; 2], (u64, usize)> = BTreeMap::new();
-    for cell in cells.iter().map(|c| grid.cells[*c].map(u64::from)) {
-        for k in 0..3 {
-            let (a, b) = (cell[k], cell[(k + 1) % 3]);
-            edges.entry([a.min(b), a.max(b)]).or_insert((cell[3 + k], 0)).1 += 1;
-        }
-    }
-    let uv = |node: u64| grid.uv[node as usize];
-    // Sums and halves of multiples of 2^-52 below 2 are exact.
-    let is_middle = |([a, b], mid): ([u64; 2], u64)| (0..2).all(|k| 2.0 * uv(mid)[k] == uv(a)[k] + uv(b)[k]);
-    edges.into_iter().filter(|(_, (_, count))| *count == 1).all(|(ends, (mid, _))| is_middle((ends, mid)))
 }
 
 /// The map of the given cells, with its points numbered from the first one on.

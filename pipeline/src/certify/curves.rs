@@ -12,7 +12,7 @@
 
 use super::arcs::Arc;
 use super::polygons::Wrong;
-use crate::evaluate::Bvh;
+use super::sides::{Joint, first_found, only_left, sides_of};
 use crate::grid::bezier_control;
 use crate::vec3::BoundingBox;
 use num_bigint::BigInt;
@@ -38,15 +38,6 @@ type Point = [i128; 2];
 #[derive(Clone, Copy)]
 struct Piece([Point; 3]);
 
-/// How two pieces follow each other.
-#[derive(Clone, Copy, Default)]
-struct Joint {
-    /// The second begins where the first ends.
-    forward: bool,
-    /// The first begins where the second ends.
-    backward: bool,
-}
-
 /// What is known of two arcs.
 enum Verdict {
     Apart,
@@ -67,12 +58,7 @@ pub(super) fn outer_of(loops: &[Vec<Arc>]) -> Result<usize, Wrong> {
     if let Some(wrong) = clash(loops) {
         return Err(wrong);
     }
-    let turning_left: Vec<usize> = (0..loops.len()).filter(|i| turns_left(&loops[*i])).collect();
-    match turning_left[..] {
-        [outer] => Ok(outer),
-        // The second that turns left; where none does, the first loop.
-        _ => Err(Wrong::Outer(turning_left.get(1).copied().unwrap_or(0))),
-    }
+    only_left(loops.len(), |i| turns_left(&loops[i]))
 }
 
 /// Whether the area that a loop bounds, on its left, is positive.
@@ -91,43 +77,21 @@ fn turns_left(arcs: &[Arc]) -> bool {
 
 /// The first two arcs that meet elsewhere than at a node between neighbours, or may do so.
 fn clash(loops: &[Vec<Arc>]) -> Option<Wrong> {
-    let mut places: Vec<(usize, usize)> = Vec::new();
-    for (number, arcs) in loops.iter().enumerate() {
-        places.extend((0..arcs.len()).map(|i| (number, i)));
-    }
-    let pieces: Vec<Piece> = places.iter().map(|(l, i)| Piece::of(&loops[*l][*i])).collect();
-    let tree = Bvh::new(pieces.iter().map(Piece::around));
-    // The tree tells pairs in an order of its own: the first by number is kept, and only those before it are looked at.
-    let mut first: Option<([u32; 2], Wrong)> = None;
-    let mut left = ARCS_PAIRED + PAIRS_PER_ARC * pieces.len();
-    tree.pairs(|a, b| {
-        if left == 0 {
-            first.get_or_insert(([a, b], Wrong::Undecided([places[a as usize], places[b as usize]])));
-            return;
+    let sides = sides_of(loops);
+    let pieces: Vec<Piece> = sides.iter().map(|(l, i)| Piece::of(&loops[*l][*i])).collect();
+    let most = ARCS_PAIRED + PAIRS_PER_ARC * pieces.len();
+    first_found(pieces.iter().map(Piece::around), |pair, before| {
+        let [s, t] = pair.map(|side| sides[side as usize]);
+        if before >= most {
+            return Some(Wrong::Undecided([s, t]));
         }
-        left -= 1;
-        let is_earlier = first.is_none_or(|(pair, _)| [a, b] < pair);
-        if !is_earlier {
-            return;
+        let [a, b] = pair.map(|side| pieces[side as usize]);
+        match compare(a, b, Joint::between(loops, s, t)) {
+            Verdict::Apart => None,
+            Verdict::Meet => Some(Wrong::Crossing([s, t])),
+            Verdict::Undecided => Some(Wrong::Undecided([s, t])),
         }
-        let sides = [places[a as usize], places[b as usize]];
-        let joint = joint_of(loops, sides);
-        let wrong = match compare(pieces[a as usize], pieces[b as usize], joint) {
-            Verdict::Apart => return,
-            Verdict::Meet => Wrong::Crossing(sides),
-            Verdict::Undecided => Wrong::Undecided(sides),
-        };
-        first = Some(([a, b], wrong));
-    });
-    first.map(|(_, wrong)| wrong)
-}
-
-fn joint_of(loops: &[Vec<Arc>], [s, t]: [(usize, usize); 2]) -> Joint {
-    if s.0 != t.0 {
-        return Joint::default();
-    }
-    let count = loops[s.0].len();
-    Joint { forward: (s.1 + 1) % count == t.1, backward: (t.1 + 1) % count == s.1 }
+    })
 }
 
 /// Whether two arcs have a point in common, the nodes at joints not counted. Ends after [`PAIRS`] pairs of pieces.

@@ -25,6 +25,7 @@ mod arcs;
 mod curves;
 mod incidence;
 pub(crate) mod polygons;
+mod sides;
 mod star;
 mod straight;
 
@@ -47,6 +48,24 @@ pub struct PlanarMap {
     pub nodes: Vec<GridPoint>,
     /// One point per hole, in any order.
     pub hole_centres: Vec<GridPoint>,
+}
+
+impl PlanarMap {
+    /// Whether the middle of every edge that one cell has lies in the middle of its ends, exactly: the boundary consists of
+    /// chords, as natural ones do. Vertices lie on the grid of vertices.
+    pub fn boundary_is_in_chords(&self) -> bool {
+        // An edge is known by its middle.
+        let mut cells_at = vec![0_u8; self.nodes.len()];
+        for mid in self.cells.iter().flat_map(|cell| &cell[3..]) {
+            let count = &mut cells_at[*mid as usize];
+            *count = count.saturating_add(1);
+        }
+        let is_inside_or_chord = |from: u32, mid: u32, to: u32| {
+            let [p, m, q] = [from, mid, to].map(|n| self.nodes[n as usize]);
+            cells_at[mid as usize] > 1 || p.midpoint(q) == m
+        };
+        self.cells.iter().all(|cell| (0..3).all(|k| is_inside_or_chord(cell[k], cell[3 + k], cell[(k + 1) % 3])))
+    }
 }
 
 /// What was proven, and how.

@@ -4,7 +4,7 @@
 //! preimages of a point is its winding number about the loops, which is 1 inside the outer one and outside the holes,
 //! and 0 elsewhere.
 
-use crate::evaluate::Bvh;
+use super::sides::{Joint, Side, first_found, only_left, sides_of};
 use crate::grid::{GridPoint, orientation};
 use crate::vec3::BoundingBox;
 use num_bigint::BigInt;
@@ -15,7 +15,8 @@ pub enum Wrong {
     /// Two sides cross or touch, each given by its loop and its position there.
     #[error("{} and {} cross or touch", Place(&.0[0]), Place(&.0[1]))]
     Crossing([(usize, usize); 2]),
-    /// Two sides that are curved, each given by its loop and its position there, come so close along each other that it is not decided whether they meet.
+    /// Two sides that are curved, each given by its loop and its position there, come so close along each other that it is
+    /// not decided whether they meet.
     #[error("it is not decided whether {} and {}, which are curved, cross or touch", Place(&.0[0]), Place(&.0[1]))]
     Undecided([(usize, usize); 2]),
     /// Not exactly one loop turns left; this one is given as evidence.
@@ -51,10 +52,9 @@ pub fn check(loops: &[Vec<GridPoint>]) -> Option<Wrong> {
     if let Some(pair) = crossing(loops) {
         return Some(Wrong::Crossing(pair));
     }
-    let turning_left: Vec<usize> = (0..loops.len()).filter(|i| doubled_area(&loops[*i]) > BigInt::from(0)).collect();
-    let &[outer] = &turning_left[..] else {
-        // The second that turns left; where none does, the first loop.
-        return Some(Wrong::Outer(turning_left.get(1).copied().unwrap_or(0)));
+    let outer = match only_left(loops.len(), |i| doubled_area(&loops[i]) > BigInt::from(0)) {
+        Ok(outer) => outer,
+        Err(wrong) => return Some(wrong),
     };
     let mut holes = (0..loops.len()).filter(|i| *i != outer);
     holes.find(|hole| is_misplaced(loops, outer, *hole)).map(Wrong::Nesting)
@@ -79,26 +79,13 @@ fn doubled_area(polygon: &[GridPoint]) -> BigInt {
 }
 
 /// The first two sides that share a point other than the end that neighbours have in common.
-fn crossing(loops: &[Vec<GridPoint>]) -> Option<[(usize, usize); 2]> {
-    let mut sides: Vec<Side> = Vec::new();
-    for (l, polygon) in loops.iter().enumerate() {
-        sides.extend((0..polygon.len()).map(|i| (l, i)));
-    }
-    let tree = Bvh::new(sides.iter().map(|s| around(ends(loops, *s))));
-    // The tree tells pairs in an order of its own: the first by number is kept, and only those before it are looked at.
-    let mut first: Option<[u32; 2]> = None;
-    tree.pairs(|a, b| {
-        let (s, t) = (sides[a as usize], sides[b as usize]);
-        let is_earlier = first.is_none_or(|first| [a, b] < first);
-        if is_earlier && clash(ends(loops, s), ends(loops, t), succession(loops, s, t)) {
-            first = Some([a, b]);
-        }
-    });
-    first.map(|pair| pair.map(|side| sides[side as usize]))
+fn crossing(loops: &[Vec<GridPoint>]) -> Option<[Side; 2]> {
+    let sides = sides_of(loops);
+    first_found(sides.iter().map(|s| around(ends(loops, *s))), |pair, _| {
+        let [s, t] = pair.map(|side| sides[side as usize]);
+        clash(ends(loops, s), ends(loops, t), Joint::between(loops, s, t)).then_some([s, t])
+    })
 }
-
-/// A side of a polygon: its loop, and its position there.
-type Side = (usize, usize);
 
 /// The points at which a side begins and ends.
 fn ends(loops: &[Vec<GridPoint>], (l, i): Side) -> [GridPoint; 2] {
@@ -106,39 +93,14 @@ fn ends(loops: &[Vec<GridPoint>], (l, i): Side) -> [GridPoint; 2] {
     [polygon[i], polygon[(i + 1) % polygon.len()]]
 }
 
-/// How two sides follow each other in a loop.
-enum Succession {
-    None,
-    /// The second begins where the first ends.
-    Forward,
-    /// The first begins where the second ends.
-    Backward,
-    /// Both: a loop of two sides.
-    Both,
-}
-
-fn succession(loops: &[Vec<GridPoint>], s: Side, t: Side) -> Succession {
-    if s.0 != t.0 {
-        return Succession::None;
-    }
-    let count = loops[s.0].len();
-    let follows = |first: Side, second: Side| (first.1 + 1) % count == second.1;
-    match (follows(s, t), follows(t, s)) {
-        (true, true) => Succession::Both,
-        (true, false) => Succession::Forward,
-        (false, true) => Succession::Backward,
-        (false, false) => Succession::None,
-    }
-}
-
 /// Whether two sides share a point other than the end that neighbours have in common.
-fn clash([a, b]: [GridPoint; 2], [c, d]: [GridPoint; 2], succession: Succession) -> bool {
-    match succession {
+fn clash([a, b]: [GridPoint; 2], [c, d]: [GridPoint; 2], joint: Joint) -> bool {
+    match (joint.forward, joint.backward) {
         // There and back along one side.
-        Succession::Both => true,
-        Succession::Forward => turns_back(a, b, d),
-        Succession::Backward => turns_back(c, d, b),
-        Succession::None => meet([a, b], [c, d]),
+        (true, true) => true,
+        (true, false) => turns_back(a, b, d),
+        (false, true) => turns_back(c, d, b),
+        (false, false) => meet([a, b], [c, d]),
     }
 }
 

@@ -98,7 +98,7 @@ impl FilledChart {
     /// The chart as it is: holes stay open, and what is prescribed is prescribed along all loops, that of the outer one
     /// first.
     pub fn open(chart: &Chart) -> Self {
-        let outer: Vec<HalfEdgeId> = chart.outer().iter().chain(chart.holes().iter().flatten()).copied().collect();
+        let outer: Vec<HalfEdgeId> = chart.boundary().collect();
         let chart_vertices = chart.vertices().len();
         Self {
             elimination: elimination::of_vertices(chart.triangles(), chart_vertices, &outer),

@@ -86,12 +86,12 @@ impl Cutter<'_> {
         if let Some(strips) = self.strips(chart, map)? {
             return Ok(Some(strips));
         }
-        let on_disk = map.conformal_p99(chart);
-        // Only a chart that the disk does not suit is asked for a natural map.
-        if on_disk <= STRETCHED || self.suits(chart, map, STRETCHED)? == Suits::Natural {
+        let stretch = map.conformal_p99(chart);
+        // Only a chart that its map does not suit is asked for another one.
+        if stretch <= STRETCHED || self.suits(chart, map.boundary, stretch, STRETCHED)? == Suits::Natural {
             return Ok(None);
         }
-        let most = chart.holes().len().max(1) * if on_disk > TORN { MANY } else { FEW };
+        let most = chart.holes().len().max(1) * if stretch > TORN { MANY } else { FEW };
         for bound in [GOOD, STRETCHED] {
             if let Some((parts, naturals)) = self.parts_within(chart, map, bound, most)?
                 && (bound == GOOD || naturals > 0)
@@ -109,23 +109,26 @@ impl Cutter<'_> {
         if boundary == BoundaryShape::Circle || chart.holes().len() != 1 {
             return Ok(None);
         }
-        let is_flat = map.boundary == BoundaryFound::Natural
-            && map.conformal_p99(chart) <= UNROLLED
-            && distortion::area_ratio(chart, &map.certified_start) <= SHORT_RING;
-        if is_flat {
+        if unrolls(chart, map, SHORT_RING) {
             return Ok(None);
         }
         // Through the hole, as the disk shows it.
-        let disk = match map_whole(chart, order, BoundaryShape::Circle, f64::INFINITY, self.monitor) {
-            Ok(disk) => disk,
-            Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
-            Err(_) => return Ok(None),
+        let found;
+        let disk = if map.boundary == BoundaryFound::Natural {
+            match map_whole(chart, order, BoundaryShape::Circle, f64::INFINITY, self.monitor) {
+                Ok(disk) => found = disk,
+                Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
+                Err(_) => return Ok(None),
+            }
+            &found
+        } else {
+            map
         };
         let is_short = distortion::area_ratio(chart, &disk.certified_start) <= SHORT_RING;
         if is_short && disk.conformal_p99(chart) <= ROUND {
             return Ok(None);
         }
-        let Some(is_left) = left_of_hole(chart, &disk) else { return Ok(None) };
+        let Some(is_left) = left_of_hole(chart, disk) else { return Ok(None) };
         let halves = decompose::halve(chart, &is_left, decompose, self.monitor)?;
         if halves.len() != 2 {
             return Ok(None);
@@ -133,10 +136,7 @@ impl Cutter<'_> {
         let mut strips = Vec::new();
         for half in halves {
             let Attempt::Mapped(map) = self.attempt(&half)? else { return Ok(None) };
-            let is_unrolled = map.boundary == BoundaryFound::Natural
-                && map.conformal_p99(&half) <= UNROLLED
-                && distortion::area_ratio(&half, &map.certified_start) <= UNROLLED;
-            if !is_unrolled {
+            if !unrolls(&half, &map, UNROLLED) {
                 return Ok(None);
             }
             strips.push((half, *map));
@@ -168,7 +168,7 @@ impl Cutter<'_> {
                 // Left to the caller's rule for charts that do not map.
                 Attempt::Single => return Ok(None),
             };
-            let suits = self.suits(&part, &map, bound)?;
+            let suits = self.suits(&part, map.boundary, map.conformal_p99(&part), bound)?;
             let parts = if suits == Suits::Neither { self.halves(&part, &map)? } else { None };
             match parts {
                 // Nothing becomes smaller.
@@ -201,16 +201,15 @@ impl Cutter<'_> {
         Ok(parts.map_or(Attempt::Single, Attempt::Split))
     }
 
-    fn suits(&self, chart: &Chart, map: &Maps, bound: f64) -> Result<Suits, Interrupted> {
-        let stretch = map.conformal_p99(chart);
-        if map.boundary == BoundaryFound::Natural {
+    /// `stretch` is how much the map of the chart stretches, `found` its boundary.
+    fn suits(&self, chart: &Chart, found: BoundaryFound, stretch: f64, bound: f64) -> Result<Suits, Interrupted> {
+        if found == BoundaryFound::Natural {
             return Ok(if stretch <= bound { Suits::Natural } else { Suits::Neither });
         }
-        let on_disk = stretch;
-        let natural = natural::natural(chart, on_disk, self.monitor)?;
+        let natural = natural::natural(chart, stretch, self.monitor)?;
         Ok(if natural.is_some_and(|n| n.distortion.conformal_p99 <= bound) {
             Suits::Natural
-        } else if on_disk <= bound {
+        } else if stretch <= bound {
             Suits::Disk
         } else {
             Suits::Neither
@@ -227,6 +226,13 @@ impl Cutter<'_> {
             }
         }
     }
+}
+
+/// Whether a chart has a natural map that stretches hardly, and scales areas by no more than `most`.
+fn unrolls(chart: &Chart, map: &Maps, most: f64) -> bool {
+    map.boundary == BoundaryFound::Natural
+        && map.conformal_p99(chart) <= UNROLLED
+        && distortion::area_ratio(chart, &map.certified_start) <= most
 }
 
 /// Per triangle, whether it lies left of a line through the origin of the plane and the middle of the first hole, if there

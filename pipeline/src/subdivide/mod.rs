@@ -287,7 +287,7 @@ impl Proven<'_> {
         match self {
             Self::Straight(_) => true,
             Self::Quadratic(map) => {
-                map.certificate().boundary == BoundaryArgument::StarShaped || boundary_is_in_chords(map.map())
+                map.certificate().boundary == BoundaryArgument::StarShaped || map.map().boundary_is_in_chords()
             }
         }
     }
@@ -354,20 +354,6 @@ fn split(atlas: &CertifiedAtlas, straight: &[Option<&StraightMap>]) -> Result<Sp
             };
         }
     }
-}
-
-/// Whether all nodes in the middle of edges that one cell has lie on chords.
-fn boundary_is_in_chords(map: &PlanarMap) -> bool {
-    let mut count: BTreeMap<u32, usize> = BTreeMap::new();
-    map.cells.iter().flat_map(|cell| &cell[3..]).for_each(|mid| *count.entry(*mid).or_default() += 1);
-    let is_straight = |cell: &[u32; 6]| {
-        (0..3).all(|k| {
-            let [from, mid, to] = [cell[k], cell[3 + k], cell[(k + 1) % 3]];
-            let [p, m, q] = [from, mid, to].map(|n| map.nodes[n as usize]);
-            count[&mid] > 1 || p.midpoint(q) == m
-        })
-    };
-    map.cells.iter().all(is_straight)
 }
 
 /// Whether the boundary of a chart crosses or touches itself in the plane. Where it `is_proven` that the polygon through

@@ -102,8 +102,8 @@ impl<'a> Refiner<'a> {
         let mut around: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for (chart, c) in charts.iter().map(CertifiedChart::chart).zip(0..) {
             chart.faces().iter().zip(0..).for_each(|(face, f)| owner[face.index()] = (c, f));
-            for h in chart.outer().iter().chain(chart.holes().iter().flatten()) {
-                let h = on_surface(chart, *h);
+            for h in chart.boundary() {
+                let h = on_surface(chart, h);
                 around.entry(nodes.at_middle(mesh, h)).or_default().push(h.face().0);
             }
         }

@@ -126,19 +126,18 @@ const ITERATIONS: usize = 24;
 
 /// Per vertex, its share of the length of all loops.
 fn boundary_mass(chart: &Chart) -> Vec<f64> {
-    let loops = || chart.outer().iter().chain(chart.holes().iter().flatten());
-    let length: f64 = loops().map(|h| chart.length(*h)).sum();
+    let length: f64 = chart.boundary().map(|h| chart.length(h)).sum();
     let mut mass = vec![0.0; chart.vertices().len()];
-    for h in loops() {
-        for end in [*h, h.next()] {
-            mass[chart.from(end).index()] += 0.5 * chart.length(*h) / length;
+    for h in chart.boundary() {
+        for end in [h, h.next()] {
+            mass[chart.from(end).index()] += 0.5 * chart.length(h) / length;
         }
     }
     mass
 }
 
-/// Where inverse iteration begins: the vertices seen along the direction in which the boundary is spread least, or nearly
-/// so. (Any guess would do that is not at right angles to the answer.)
+/// Where inverse iteration begins: the vertices seen along the mean normal, the extremes of the boundary one beside the other.
+/// (Any guess would do that is not at right angles to the answer.)
 fn first_guess(chart: &Chart) -> Vec<f64> {
     let [first, second] = extremes(chart).map(|v| chart.points()[v]);
     let along = sub(second, first);

@@ -34,8 +34,6 @@ pub struct NaturalStart {
     pub certified: CertifiedMap,
     /// The conformal distortion that 99 % of the area do not exceed.
     pub conformal_p99: f64,
-    /// The area ratio.
-    pub area_ratio: f64,
 }
 
 /// Why a chart has no map with a natural boundary.
@@ -68,9 +66,8 @@ pub enum NoNatural {
 }
 
 /// Finds the natural boundary of `chart`, and a valid map inside it: by boundary first flattening, where it has no holes;
-/// else, or where that fails, by the spectral and the least squares conformal map of its vertices; else, for what is nearly a plane, by the
-/// projection. None of them scales areas by more than 100, or `max_area_ratio` where that is
-/// less.
+/// else, or where that fails, by the spectral and the least squares conformal map of its vertices; else, for what is nearly a
+/// plane, by the projection. None of them scales areas by more than 100, or `max_area_ratio` where that is less.
 ///
 /// # Errors
 /// [`Interrupted`].
@@ -214,13 +211,13 @@ impl Search<'_> {
             Err(_) => return refused(NoNatural::Crossing),
         };
         checkpoint.end()?;
-        let area_ratio = distortion::area_ratio(chart, &certified);
-        if area_ratio > *most {
-            return refused(NoNatural::Uneven { ratio: area_ratio });
+        let ratio = distortion::area_ratio(chart, &certified);
+        if ratio > *most {
+            return refused(NoNatural::Uneven { ratio });
         }
         let conformal_p99 = distortion::conformal_p99_of_nodes(chart, |f| filled.nodes(f).map(|n| nodes[n]));
         let filled = filled.clone();
-        Ok(Ok(NaturalStart { filled, boundary, linear, nodes, certified, conformal_p99, area_ratio }))
+        Ok(Ok(NaturalStart { filled, boundary, linear, nodes, certified, conformal_p99 }))
     }
 }
 
