@@ -3,7 +3,7 @@
 //! `cargo run --release -p planish-core --example measure_a_map`
 
 use planish_core::monitor::NoMonitor;
-use planish_core::{BoundaryShape, Order, Settings, parametrize, shapes};
+use planish_core::{BoundaryShape, Order, Settings, decompose, parametrize, shapes};
 use std::f64::consts::PI;
 
 /// Maps a hill to the disk by linear and by quadratic elements, and prints how both distort it.
@@ -12,7 +12,8 @@ use std::f64::consts::PI;
 /// None: the surface is sound.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     for order in [Order::Linear, Order::Quadratic] {
-        let settings = Settings { order, boundary: BoundaryShape::Circle, ..Settings::default() };
+        let settings =
+            Settings { order, decompose: decompose::Settings::of(BoundaryShape::Circle), ..Settings::default() };
         let atlas = parametrize(&shapes::disk(12), &settings, &NoMonitor)?;
         let certified = &atlas.charts()[0];
         let summary = certified.distortion();

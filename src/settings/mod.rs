@@ -165,9 +165,9 @@ impl Settings {
     pub fn core(&self) -> planish_core::Settings {
         planish_core::Settings {
             order: self.order,
-            boundary: self.boundary.into(),
             repair: planish_core::repair::Settings { weld: self.weld },
             decompose: planish_core::decompose::Settings {
+                boundary: self.boundary.into(),
                 max_area_ratio: self.max_area_ratio,
                 max_triangles: self.max_triangles.unwrap_or(usize::MAX),
                 strict_disks: self.strict_disks,
@@ -347,7 +347,8 @@ impl RawSettings {
     /// # Errors
     /// [`SettingsError`] for values out of range.
     pub fn check(self) -> Result<Settings, SettingsError> {
-        let core = planish_core::decompose::Settings::default();
+        let boundary = self.boundary.unwrap_or_default();
+        let core = planish_core::decompose::Settings::of(boundary.into());
         let order = match self.order.unwrap_or(2) {
             1 => Order::Linear,
             2 => Order::Quadratic,
@@ -401,7 +402,7 @@ impl RawSettings {
         Ok(Settings {
             out: self.out,
             order,
-            boundary: self.boundary.unwrap_or_default(),
+            boundary,
             weld,
             feature_angle,
             strict_disks: self.strict_disks.unwrap_or(core.strict_disks),

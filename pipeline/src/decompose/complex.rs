@@ -9,10 +9,11 @@
 
 use super::dual::Dual;
 use super::voronoi::Cells;
-use crate::topology::HalfEdgeId;
 use crate::topology::loops::cut_at_corners;
 use crate::topology::partition::Partition;
+use crate::topology::{FaceId, HalfEdgeId};
 use crate::vec3::Vec3;
+use std::f64::consts::{PI, TAU};
 
 /// No arc, no cell, no corner.
 pub(super) const NONE: u32 = u32::MAX;
@@ -30,6 +31,10 @@ pub(super) struct HalfArc {
     /// The cells that lie beyond without being joined (see [`Dual::coincident_faces`]), ascending.
     pub coincident_cells: Vec<u32>,
     pub length: f64,
+    /// The angle of its cell at the corner where it begins, in radians.
+    pub angle: f64,
+    /// By how much it turns to the left between its ends: pi less the angle of its cell, summed up over the vertices there.
+    pub turning: f64,
     /// The length that is a feature, and that weighed by its sharpness.
     pub feature: f64,
     pub sharp: f64,
@@ -49,6 +54,17 @@ pub(super) struct Cell {
     /// The sum of the area vectors.
     pub normal: Vec3,
     pub centroid: Vec3,
+    /// The sum of the angle defects of the vertices inside.
+    pub curvature: f64,
+}
+
+/// What is known of a corner.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corner {
+    /// The half-arcs that begin there.
+    pub arcs: u32,
+    /// A full turn less the angles of their cells: the angle defect, where the corner lies inside the surface.
+    pub curvature: f64,
 }
 
 /// Cells and the arcs between them.
@@ -57,14 +73,14 @@ pub(super) struct Complex {
     pub cells: Vec<Cell>,
     /// In the order of their cells, then of their first half-edges.
     pub arcs: Vec<HalfArc>,
-    pub corners: usize,
+    pub corners: Vec<Corner>,
 }
 
 impl Complex {
     pub(super) fn new(dual: &Dual, cells: &Cells) -> Self {
         let tracer = Tracer::new(dual, cells);
         let arcs = tracer.arcs();
-        let mut made = Self { cells: vec![Cell::default(); cells.len], arcs, corners: 0 };
+        let mut made = Self { cells: vec![Cell::default(); cells.len], arcs, corners: Vec::new() };
         made.measure(dual, cells, &tracer);
         made.number_corners(dual);
         made
@@ -76,12 +92,16 @@ impl Complex {
         let mut doubled = vec![0_i64; cells.len];
         let mut counted = vec![false; dual.mesh.points().len()];
         tracer.boundary.iter().for_each(|h| counted[dual.from(*h)] = true);
+        let at_boundary = counted.clone();
         tracer.boundary.iter().for_each(|h| doubled[tracer.cells.label(*h) as usize] += 1);
         for (f, t) in dual.mesh.triangles().iter().enumerate() {
             let (area, normal, centroid) = (dual.area(f), dual.area_vector(f), dual.centroid(f));
             let fresh = t.iter().filter(|v| !std::mem::replace(&mut counted[v.index()], true)).count();
             doubled[cells.labels[f] as usize] += 2 * fresh as i64 - 1;
             let cell = &mut self.cells[cells.labels[f] as usize];
+            let inside = (0..3).filter(|k| !at_boundary[t[*k].index()]);
+            cell.curvature += TAU * fresh as f64;
+            inside.for_each(|k| cell.curvature -= dual.angle(HalfEdgeId::side_of(FaceId::at(f), k)));
             cell.faces += 1;
             cell.area += area;
             (0..3).for_each(|k| cell.normal[k] += normal[k]);
@@ -93,16 +113,19 @@ impl Complex {
         }
     }
 
-    /// Replaces vertices by numbers of corners.
+    /// Replaces vertices by numbers of corners, and sums up the angles there.
     fn number_corners(&mut self, dual: &Dual) {
         let mut number = vec![NONE; dual.mesh.points().len()];
         for arc in &mut self.arcs {
-            let corner = &mut number[arc.from as usize];
-            if *corner == NONE {
-                *corner = self.corners as u32;
-                self.corners += 1;
+            let number = &mut number[arc.from as usize];
+            if *number == NONE {
+                *number = self.corners.len() as u32;
+                self.corners.push(Corner { arcs: 0, curvature: TAU });
             }
-            arc.from = *corner;
+            arc.from = *number;
+            let corner = &mut self.corners[arc.from as usize];
+            corner.arcs += 1;
+            corner.curvature -= arc.angle;
         }
     }
 }
@@ -176,11 +199,26 @@ impl<'a> Tracer<'a> {
         let mut number = vec![NONE; self.of.len() * 3];
         runs.iter().zip(0..).for_each(|(run, i)| number[run[0].index()] = i);
         let mut arcs: Vec<HalfArc> = runs.iter().map(|run| self.arc(run)).collect();
-        for arc in &mut arcs {
-            arc.next = number[self.cells.next(arc.last).index()];
-            arc.twin = self.dual.twin(arc.last).map_or(NONE, |t| number[t.index()]);
+        for a in 0..arcs.len() {
+            let last = arcs[a].last;
+            let next = number[self.cells.next(last).index()];
+            arcs[next as usize].angle = self.angle_after(last);
+            arcs[a].next = next;
+            arcs[a].twin = self.dual.twin(last).map_or(NONE, |t| number[t.index()]);
         }
         arcs
+    }
+
+    /// The angle of the cell of `h`, a half-edge of its boundary, where `h` ends. Ends as another one begins there.
+    fn angle_after(&self, h: HalfEdgeId) -> f64 {
+        let mut side = h.next();
+        let mut angle = self.dual.angle(side);
+        while !self.cells.is_boundary(side) {
+            let Some(twin) = self.dual.twin(side) else { break };
+            side = twin.next();
+            angle += self.dual.angle(side);
+        }
+        angle
     }
 
     /// The half-arc along a run of half-edges, from one corner to the next.
@@ -194,6 +232,8 @@ impl<'a> Tracer<'a> {
             twin: NONE,
             coincident_cells: self.coincident_cells(first),
             length: run.iter().map(length).sum(),
+            angle: 0.0,
+            turning: run[..run.len() - 1].iter().map(|h| PI - self.angle_after(*h)).sum(),
             feature: run.iter().filter(|h| self.dual.is_feature(**h)).map(length).sum(),
             sharp: run.iter().map(|h| length(h) * self.dual.sharpness(*h)).sum(),
             middle: self.dual.middle(run[run.len() / 2]),
@@ -213,7 +253,7 @@ mod tests {
     use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
     use crate::shapes::{self, Random};
-    use crate::topology::{ChartId, FaceId, VertexId};
+    use crate::topology::{ChartId, VertexId};
     use crate::topology::{EdgeTable, TopologySummary, VertexFans};
 
     fn surface(soup: &TriangleSoup) -> SurfaceMesh {

@@ -37,6 +37,8 @@ pub(super) struct Dual<'a> {
     coincident_faces: BTreeMap<HalfEdgeId, Vec<FaceId>>,
     /// Per half-edge the distance of the centroids at its sides by way of its middle.
     steps: Vec<f64>,
+    /// Per half-edge the angle of its triangle where it begins, by mollified lengths.
+    angles: Vec<f64>,
 }
 
 impl<'a> Dual<'a> {
@@ -59,6 +61,7 @@ impl<'a> Dual<'a> {
             centroids: triangles.iter().map(centroid).collect(),
             areas: mesh.metric().shapes.iter().map(|s| s.area()).collect(),
             steps: Vec::new(),
+            angles: mesh.metric().shapes.iter().flat_map(|s| s.angles()).collect(),
             coincident_faces: BTreeMap::new(),
             mesh,
             checkpoint: Checkpoint::new(monitor),
@@ -152,6 +155,11 @@ impl<'a> Dual<'a> {
     /// The mollified area.
     pub(super) fn area(&self, face: usize) -> f64 {
         self.areas[face]
+    }
+
+    /// The angle of the triangle of `h` at the vertex where `h` begins, in radians.
+    pub(super) fn angle(&self, h: HalfEdgeId) -> f64 {
+        self.angles[h.index()]
     }
 
     /// The normal times the doubled true area.

@@ -29,7 +29,7 @@ pub(super) fn evaluate(network: &Network, cells: &Cells) -> Result<Vec<Option<Pr
     network.dual.checkpoint()?;
     let (cut, labels) = cut(network, cells);
     let complex = Complex::new(network.dual, &cut);
-    let graph = CellGraph::new(&complex);
+    let graph = CellGraph::new(&complex, network.limits.boundary);
     let mut regions = Regions::new(&complex, labels, network.label_count());
     let mut predictions = Vec::with_capacity(network.label_count());
     for label in 0..network.label_count() {

@@ -37,6 +37,11 @@ impl GraphLaplacian {
         (0..2).for_each(|k| self.rhs[i as usize][k] += weight * uv[k]);
     }
 
+    /// Adds a load to one of the two right-hand sides.
+    pub(super) fn add_load(&mut self, i: u32, load: [f64; 2]) {
+        (0..2).for_each(|k| self.rhs[i as usize][k] += load[k]);
+    }
+
     /// The uv of the unknowns for which the sum of all weights times squared lengths is least; none where the matrix is not
     /// positive definite in doubles.
     pub(super) fn solve(self) -> Option<Vec<[f64; 2]>> {

@@ -4,6 +4,7 @@
 use super::predict::{CellGraph, WORK_PER_CELL, predict};
 use super::regions::{Regions, Shape, Union};
 use crate::monitor::{Checkpoint, Interrupted};
+use crate::settings::BoundaryShape;
 use crate::vec3::norm;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -15,6 +16,8 @@ pub(super) struct Limits {
     pub area_ratio: f64,
     pub triangles: usize,
     pub strict_disks: bool,
+    /// Which maps are predicted.
+    pub boundary: BoundaryShape,
 }
 
 impl Limits {

@@ -45,6 +45,7 @@ mod voronoi;
 use crate::atlas::Atlas;
 use crate::mesh::SurfaceMesh;
 use crate::monitor::{Interrupted, Monitor};
+use crate::settings::BoundaryShape;
 use crate::topology::HalfEdgeId;
 pub use assemble::assemble;
 use complex::Complex;
@@ -89,7 +90,8 @@ pub enum Error {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// The largest area ratio of a chart (see [`crate::measure::distortion::Summary::area_ratio`]). At least 10; default 1e6.
+    /// The largest area ratio of a chart (see [`crate::measure::distortion::Summary::area_ratio`]). At least 10; default
+    /// [`BoundaryShape::max_area_ratio`].
     pub max_area_ratio: f64,
     /// The largest number of triangles of a chart; default none.
     pub max_triangles: usize,
@@ -98,11 +100,26 @@ pub struct Settings {
     /// The dihedral angle, in degrees, above which an edge is a feature: seams follow features, and charts do not
     /// cross those that separate them. In (0, 180); default 40; none: there are no features.
     pub feature_angle: Option<f64>,
+    /// The boundary that charts will have in the plane: it is their maps that are predicted.
+    pub boundary: BoundaryShape,
+}
+
+impl Settings {
+    /// What charts with such a boundary must respect by default.
+    pub fn of(boundary: BoundaryShape) -> Self {
+        Self {
+            max_area_ratio: boundary.max_area_ratio(),
+            max_triangles: usize::MAX,
+            strict_disks: false,
+            feature_angle: Some(40.0),
+            boundary,
+        }
+    }
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { max_area_ratio: 1e6, max_triangles: usize::MAX, strict_disks: false, feature_angle: Some(40.0) }
+        Self::of(BoundaryShape::default())
     }
 }
 
@@ -127,7 +144,7 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, monitor: &dyn Monitor)
     let (dual, features) = with_features(mesh, settings, monitor)?;
     let limits = Limits::new(settings);
     let (cells, complex) = cells(&dual, &limits)?;
-    let graph = CellGraph::new(&complex);
+    let graph = CellGraph::new(&complex, settings.boundary);
     let search = Search {
         complex: &complex,
         graph: &graph,
@@ -151,6 +168,7 @@ impl Limits {
             area_ratio: settings.max_area_ratio.powf(MARGIN),
             triangles: settings.max_triangles,
             strict_disks: settings.strict_disks,
+            boundary: settings.boundary,
         }
     }
 }

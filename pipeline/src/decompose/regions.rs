@@ -76,7 +76,7 @@ impl<'a> Regions<'a> {
             of_cell,
             all: vec![Region::default(); count],
             seen_arcs: VisitStamps::new(complex.arcs.len()),
-            seen_corners: VisitStamps::new(complex.corners),
+            seen_corners: VisitStamps::new(complex.corners.len()),
         };
         for (c, cell) in complex.cells.iter().enumerate() {
             let region = &mut made.all[made.of_cell[c] as usize];
@@ -92,7 +92,7 @@ impl<'a> Regions<'a> {
 
     /// Finds the boundaries; arcs and corners inside count for the Euler numbers.
     fn bound(&mut self) {
-        let mut counted = vec![false; self.complex.corners];
+        let mut counted = vec![false; self.complex.corners.len()];
         let all = 0..self.complex.arcs.len() as u32;
         let (outer, inner): (Vec<u32>, Vec<u32>) = all.partition(|a| self.beyond(*a) != Some(self.of(*a)));
         for arc in outer {

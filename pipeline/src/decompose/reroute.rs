@@ -186,6 +186,7 @@ mod tests {
     use crate::decompose::shortest::{Bounds, Goal, Tree};
     use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
+    use crate::settings::BoundaryShape;
     use crate::shapes::{self, Random};
 
     /// Compares a network with one that is made anew of its labels.
@@ -231,7 +232,8 @@ mod tests {
             let dual = Dual::new(&mesh, &NoMonitor);
             let cells = compact_cells(&dual, |_| charts, &dual.checkpoint).expect("nobody cancels");
             let largest = 11 * mesh.triangles().len() / charts / 10;
-            let limits = Limits { area_ratio: 1e6, triangles: largest, strict_disks: false };
+            let limits =
+                Limits { area_ratio: 1e6, triangles: largest, strict_disks: false, boundary: BoundaryShape::Natural };
             let mut network = Network::new(&dual, cells.labels, limits);
             let mut random = Random(7);
             let (mut laid, mut undone) = (0, 0);

@@ -45,9 +45,9 @@ pub struct Summary {
 /// ```
 /// use planish_core::measure::distortion::{area_ratio, fields, summary};
 /// use planish_core::monitor::NoMonitor;
-/// use planish_core::{BoundaryShape, Settings, parametrize, shapes};
+/// use planish_core::{BoundaryShape, Settings, decompose, parametrize, shapes};
 ///
-/// let settings = Settings { boundary: BoundaryShape::Circle, ..Settings::default() };
+/// let settings = Settings { decompose: decompose::Settings::of(BoundaryShape::Circle), ..Settings::default() };
 /// let atlas = parametrize(&shapes::disk(6), &settings, &NoMonitor)?;
 /// let (chart, map) = (atlas.charts()[0].chart(), atlas.charts()[0].map());
 /// let fields = fields(chart, map);

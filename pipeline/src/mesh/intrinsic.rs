@@ -61,6 +61,13 @@ impl TriangleShape {
         })
     }
 
+    /// The angles at corners 0, 1, 2, in radians.
+    pub fn angles(&self) -> [f64; 3] {
+        let half = self.half_cotangents();
+        // Edge k + 1 lies across from corner k.
+        [0, 1, 2].map(|k| 1.0_f64.atan2(2.0 * half[(k + 1) % 3]))
+    }
+
     /// The tangents of half the angles at corners 0, 1, 2.
     pub fn half_angle_tangents(&self) -> [f64; 3] {
         let [a, b, c] = self.lengths;

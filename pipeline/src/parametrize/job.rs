@@ -76,6 +76,17 @@ impl Maps {
     }
 }
 
+impl Maps {
+    /// The share of the chart's triangles that are invalid in its harmonic map; 0 where there is none.
+    pub(super) fn invalid_share(&self, chart: &Chart) -> f64 {
+        let invalid = match &self.harmonic {
+            Some(Ok(map)) => map.invalid().len(),
+            _ => 0,
+        };
+        invalid as f64 / chart.triangles().len() as f64
+    }
+}
+
 /// Why a chart cannot be mapped as a whole. All but the last mean: split it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
@@ -141,7 +152,9 @@ impl ChartJob {
                     continue;
                 }
                 // Its map is what it is.
-                Attempt::Single => map_whole(&chart, settings.order, settings.boundary, f64::INFINITY, monitor)?,
+                Attempt::Single => {
+                    map_whole(&chart, settings.order, settings.decompose.boundary, f64::INFINITY, monitor)?
+                }
             };
             mapped.push(MappedChart { chart, settings, maps });
         }

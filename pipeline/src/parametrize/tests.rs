@@ -17,11 +17,9 @@ fn whole(soup: &TriangleSoup) -> Chart {
 
 /// The job to map a chart to the disk, without features.
 fn job(chart: Chart, max_area_ratio: f64) -> ChartJob {
-    let decompose = decompose::Settings { feature_angle: None, max_area_ratio, ..Default::default() };
-    ChartJob {
-        chart,
-        settings: ChartSettings { decompose, boundary: BoundaryShape::Circle, ..ChartSettings::default() },
-    }
+    let on_disk = decompose::Settings::of(BoundaryShape::Circle);
+    let decompose = decompose::Settings { feature_angle: None, max_area_ratio, ..on_disk };
+    ChartJob { chart, settings: ChartSettings { decompose, ..ChartSettings::default() } }
 }
 
 /// The parts into which one chart of all falls before it is untangled.
@@ -134,7 +132,7 @@ fn the_reason_why_there_is_no_atlas_is_kept() {
 /// What comes of a surface as one chart, whose natural boundary is asked for.
 fn naturally(soup: &TriangleSoup) -> Vec<CertifiedChart> {
     let mut job = job(whole(soup), 1e6);
-    job.settings.boundary = BoundaryShape::Natural;
+    job.settings.decompose.boundary = BoundaryShape::Natural;
     job.run(&NoMonitor).expect("maps")
 }
 
@@ -162,9 +160,7 @@ fn what_can_be_laid_out_flat_is_not_stretched() {
         let argument = if holes == 0 { BoundaryArgument::StarShaped } else { BoundaryArgument::Simple };
         assert_eq!((proof.boundary, proof.holes), (argument, holes));
         let provenance = chart.provenance();
-        // Boundaries of disks are found first, and a harmonic map inside; with holes both come from one map.
-        let method = if holes == 0 { Method::Harmonic } else { Method::Conformal };
-        assert_eq!((provenance.boundary, provenance.linear.method), (BoundaryFound::Natural, method));
+        assert_eq!((provenance.boundary, provenance.linear.method), (BoundaryFound::Natural, Method::Harmonic));
     }
 }
 

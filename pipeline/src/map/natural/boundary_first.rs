@@ -1,23 +1,43 @@
-//! The boundary that a disk has when it is flattened conformally, and every edge of the boundary keeps its length.
+//! The boundary that a chart has when it is flattened conformally, and every edge of its outer loop keeps its length.
 //!
 //! Boundary first flattening (Sawhney and Crane 2017, *Boundary first flattening*, doi 10.1145/3132705) with scale factors of
-//! one on the boundary, which of all conformal maps distorts areas least. One Poisson problem gives the curvature that the
+//! one on the outer loop, which of all conformal maps distorts areas least. One Poisson problem gives the curvature that the
 //! boundary has in the plane; angles and lengths then are those of a polygon, which is closed by the least change of lengths
 //! (their equations 8 to 11 and section 4.4). Unlike least squares conformal maps it depends on no choice of vertices, and
 //! has a limit under refinement.
+//!
+//! Theirs is for disks. Along a hole the logarithm of the scale is taken to be a constant here, such that the hole's loop turns
+//! by a full turn in the plane: one equation for each hole, whose coefficients are those of harmonic functions with the same
+//! matrix. So the loop of each hole has its shape, too; [`placed`] tells where it lies.
 
+use super::laplace::Laplacian;
+use super::placement::placed;
 use crate::atlas::Chart;
-use crate::fem::assembly::Assembly;
-use crate::fem::dofs::Dofs;
-use crate::fem::element::{Element, P1};
 use crate::fem::sparse;
 use crate::map::filled::FilledChart;
-use crate::mesh::TriangleShape;
-use crate::monitor::Monitor;
+use crate::measure::quantiles::{Weighted, quantiles};
+use crate::monitor::{Checkpoint, Monitor};
+use crate::topology::HalfEdgeId;
 use std::f64::consts::{PI, TAU};
 
-/// The places of the vertices of the outer loop of `chart`, which has no holes, in its order; none where lengths would not
-/// stay positive. The polygon need not be simple.
+/// The places of the vertices of a loop, in its order.
+pub(super) type Polygon = Vec<[f64; 2]>;
+
+/// A chart as it is laid out.
+pub(super) struct Flattened {
+    /// The outer loop, then those of the holes; none where lengths would not stay positive. They need not be simple.
+    pub loops: Option<Vec<Polygon>>,
+    /// The area ratio of the conformal map, as far as the scale tells it.
+    pub area_ratio: f64,
+}
+
+/// Charts with more holes are not laid out: each takes three solutions.
+const MOST_HOLES: usize = 100;
+
+/// The share of the area that is left out at either end: as in the area ratio of a map.
+const QUANTILE: f64 = 0.001;
+
+/// Lays `chart` out; none where it has too many holes.
 ///
 /// # Errors
 /// The system cannot be solved, or interrupted.
@@ -25,59 +45,124 @@ pub(super) fn boundary_first(
     chart: &Chart,
     filled: &FilledChart,
     monitor: &dyn Monitor,
-) -> Result<Option<Vec<[f64; 2]>>, sparse::Error> {
-    let curvature = curvature_in_plane(chart, filled, monitor)?;
-    let lengths: Vec<f64> = chart.outer().iter().map(|h| chart.length(*h)).collect();
-    let mut direction = 0.0_f64;
-    let mut tangents = Vec::with_capacity(lengths.len());
-    for h in chart.outer() {
-        direction += curvature[chart.from(*h).index()];
-        let (sin, cos) = direction.sin_cos();
-        tangents.push([cos, sin]);
+) -> Result<Option<Flattened>, sparse::Error> {
+    if chart.holes().len() > MOST_HOLES {
+        return Ok(None);
     }
-    Ok(closed(&lengths, &tangents).map(|lengths| laid_out(&lengths, &tangents)))
+    let checkpoint = Checkpoint::new(monitor);
+    let laplacian = Laplacian::new(chart, filled.elimination().iter().map(|v| v.0).collect());
+    let matrix = laplacian.matrix();
+    let analysis = if laplacian.is_rigid() { None } else { Some(laplacian.pattern().analyse_as_numbered()?) };
+    checkpoint.end()?;
+    let factor = match &analysis {
+        Some(analysis) => Some(analysis.factorise(&matrix, monitor)?),
+        None => None,
+    };
+    // Nobody is asked while the factor is held: its memory is reserved.
+    let flat = FlatMetric::new(chart, &laplacian, &factor);
+    let loops = flat.as_ref().and_then(|flat| flat.polygons(chart));
+    let placed = loops.and_then(|loops| placed(chart, &laplacian, &factor, loops));
+    drop(factor);
+    checkpoint.end()?;
+    Ok(flat.map(|flat| Flattened { loops: placed, area_ratio: flat.area_ratio(chart) }))
 }
 
-/// Per vertex of the boundary, by how much the boundary turns there in the plane (of others nothing is said).
-fn curvature_in_plane(chart: &Chart, filled: &FilledChart, monitor: &dyn Monitor) -> Result<Vec<f64>, sparse::Error> {
-    let vertices = chart.vertices().len();
-    let inside: Vec<u32> = filled.elimination().iter().map(|v| v.0).collect();
-    let mut angles = vec![0.0; vertices];
+/// The loops of a chart: the outer one, then those of the holes.
+pub(super) fn loops(chart: &Chart) -> impl Iterator<Item = &[HalfEdgeId]> {
+    std::iter::once(chart.outer()).chain(chart.holes().iter().map(|hole| &hole[..]))
+}
+
+/// The metric of the plane on a chart.
+struct FlatMetric {
+    /// Per vertex the logarithm of the scale of lengths.
+    log_scale: Vec<f64>,
+    /// Per vertex of the boundary, by how much the boundary turns there in the plane (of others nothing is said).
+    turning: Vec<f64>,
+}
+
+impl FlatMetric {
+    /// None where the holes' equations are singular in doubles.
+    fn new(chart: &Chart, laplacian: &Laplacian, factor: &Option<sparse::Factor>) -> Option<Self> {
+        let vertices = chart.vertices().len();
+        let angles = angle_sums(chart);
+        // Inside, nothing is left of the angle defect: the Laplacian of the logarithm of the scale is the curvature.
+        let load: Vec<f64> = angles.iter().map(|angle| angle - TAU).collect();
+        let none = vec![0.0; vertices];
+        let mut log_scale = laplacian.solve(factor, &load, none.clone());
+        // The boundary turns by its own curvature, and by the derivative of that logarithm across it.
+        let of_scale = laplacian.apply(&log_scale);
+        let mut turning: Vec<f64> = angles.iter().zip(of_scale).map(|(angle, flux)| PI - angle + flux).collect();
+        // Per hole the function that is one along it, and its derivative across the boundary.
+        let mut scaled = Vec::with_capacity(chart.holes().len());
+        for hole in chart.holes() {
+            let mut one = none.clone();
+            hole.iter().for_each(|h| one[chart.from(*h).index()] = 1.0);
+            let function = laplacian.solve(factor, &none, one);
+            let flux = laplacian.apply(&function);
+            scaled.push((function, flux));
+        }
+        let along =
+            |hole: &[HalfEdgeId], values: &[f64]| hole.iter().map(|h| values[chart.from(*h).index()]).sum::<f64>();
+        let mut equations = Vec::with_capacity(chart.holes().len());
+        for hole in chart.holes() {
+            let mut equation: Vec<f64> = scaled.iter().map(|(_, flux)| along(hole, flux)).collect();
+            // With the chart on its left it turns to the right.
+            equation.push(-TAU - along(hole, &turning));
+            equations.push(equation);
+        }
+        let factors = super::dense::solve(equations)?;
+        for ((function, flux), factor) in scaled.iter().zip(factors) {
+            for v in 0..vertices {
+                log_scale[v] += factor * function[v];
+                turning[v] += factor * flux[v];
+            }
+        }
+        Some(Self { log_scale, turning })
+    }
+
+    /// The ratio of the extreme quantiles of the area scale.
+    fn area_ratio(&self, chart: &Chart) -> f64 {
+        let scale = |t: &[crate::topology::VertexId; 3]| {
+            let mean = t.iter().map(|v| self.log_scale[v.index()]).sum::<f64>() / 3.0;
+            (2.0 * mean).exp()
+        };
+        let weighted = chart.triangles().iter().zip(chart.shapes());
+        let mut scales: Vec<Weighted> =
+            weighted.map(|(t, shape)| Weighted { value: scale(t), weight: shape.area() }).collect();
+        let [low, high] = quantiles(&mut scales, [QUANTILE, 1.0 - QUANTILE]);
+        if low > 0.0 { high / low } else { f64::INFINITY }
+    }
+
+    /// The loops, each in a place of its own.
+    fn polygons(&self, chart: &Chart) -> Option<Vec<Polygon>> {
+        loops(chart).map(|boundary_loop| self.polygon(chart, boundary_loop)).collect()
+    }
+
+    fn polygon(&self, chart: &Chart, boundary_loop: &[HalfEdgeId]) -> Option<Polygon> {
+        let mut direction = 0.0_f64;
+        let (mut lengths, mut tangents) = (Vec::new(), Vec::new());
+        for h in boundary_loop {
+            let from = chart.from(*h).index();
+            direction += self.turning[from];
+            let (sin, cos) = direction.sin_cos();
+            tangents.push([cos, sin]);
+            // Along a loop the scale is one and the same.
+            lengths.push(chart.length(*h) * self.log_scale[from].exp());
+        }
+        let lengths = closed(&lengths, &tangents)?;
+        Some(laid_out(&lengths, &tangents))
+    }
+}
+
+/// Per vertex the sum of the angles of its triangles.
+fn angle_sums(chart: &Chart) -> Vec<f64> {
+    let mut angles = vec![0.0; chart.vertices().len()];
     for (t, shape) in chart.triangles().iter().zip(chart.shapes()) {
-        for (v, angle) in t.iter().zip(corner_angles(shape)) {
+        for (v, angle) in t.iter().zip(shape.angles()) {
             angles[v.index()] += angle;
         }
     }
-    let dofs = Dofs::new(vertices, inside);
-    let triangle = |f: usize| chart.triangles()[f].map(|v| v.index());
-    let faces = chart.triangles().len();
-    let pattern = dofs.pattern((0..faces).map(triangle));
-    // On the boundary nothing is scaled.
-    let mut system = Assembly::new(&dofs, &pattern, vec![[0.0]; vertices]);
-    for f in 0..faces {
-        system.add(f, &triangle(f), &P1::stiffness(&chart.shapes()[f]));
-    }
-    // Inside, what is left of the angle defect is to be none: the Laplacian of the logarithm of the scale is the curvature.
-    for v in dofs.free() {
-        system.add_load(*v as usize, [-(TAU - angles[*v as usize])]);
-    }
-    let log_scale = system.solve(&pattern.analyse_as_numbered()?, monitor)?;
-    // The boundary turns by its own curvature, and by the derivative of that logarithm across it.
-    let mut curvature: Vec<f64> = angles.iter().map(|angle| PI - angle).collect();
-    for f in 0..faces {
-        let (nodes, stiffness) = (triangle(f), P1::stiffness(&chart.shapes()[f]));
-        for i in 0..3 {
-            curvature[nodes[i]] += (0..3).map(|j| stiffness[i][j] * log_scale[nodes[j]][0]).sum::<f64>();
-        }
-    }
-    Ok(curvature)
-}
-
-/// The angles at the corners of a triangle.
-fn corner_angles(shape: &TriangleShape) -> [f64; 3] {
-    let half = shape.half_cotangents();
-    // Edge k + 1 lies across from corner k.
-    [0, 1, 2].map(|k| 1.0_f64.atan2(2.0 * half[(k + 1) % 3]))
+    angles
 }
 
 /// The lengths changed as little as possible, long ones more than short ones, so that the polygon is closed; none where one
@@ -120,7 +205,8 @@ mod tests {
         let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
         let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk");
         let chart = atlas.into_charts().remove(0);
-        let polygon = boundary_first(&chart, &FilledChart::open(&chart), &NoMonitor).expect("solves").expect("closes");
+        let flat = boundary_first(&chart, &FilledChart::open(&chart), &NoMonitor).expect("solves").expect("few holes");
+        let polygon = flat.loops.expect("closes").remove(0);
         (chart, polygon)
     }
 

@@ -13,6 +13,9 @@
 
 mod boundary_first;
 mod conformal;
+mod dense;
+mod laplace;
+mod placement;
 mod projection;
 mod start;
 mod upright;
@@ -70,9 +73,9 @@ const EVEN: f64 = 100.0;
 /// ```
 /// use planish_core::map::natural::natural;
 /// use planish_core::monitor::NoMonitor;
-/// use planish_core::{BoundaryShape, Settings, parametrize, shapes};
+/// use planish_core::{BoundaryShape, Settings, decompose, parametrize, shapes};
 ///
-/// let settings = Settings { boundary: BoundaryShape::Circle, ..Settings::default() };
+/// let settings = Settings { decompose: decompose::Settings::of(BoundaryShape::Circle), ..Settings::default() };
 /// let plate = parametrize(&shapes::disk_with_holes(13, 2), &settings, &NoMonitor)?;
 /// let on_disk = plate.charts()[0].distortion().conformal_p99;
 /// let own = natural(plate.charts()[0].chart(), on_disk, &NoMonitor)?.expect("it is nearly flat");

@@ -1,0 +1,173 @@
+//! The conformal map into the plane that keeps the lengths of the outer loop.
+//!
+//! As in boundary first flattening (Sawhney and Crane 2017, doi 10.1145/3132705, section 4), the logarithm a of its scale
+//! solves a Poisson problem: with the Laplacian A of the graph and the curvatures K of the cells A a = -K, a = 0 along the outer
+//! loop. Along an inner loop a is a constant, such that the loop turns by a full turn in the plane: the node that closes it on
+//! the disk has the load -(2 pi + k) here, where k is by how much the loop turns on the surface. So a cylinder of length L and
+//! radius R gets the area ratio e^(2 L / R) of a ring.
+//!
+//! By how much the outer loop turns in the plane at each of its cells tells its shape there, and whether the map covers itself.
+
+use super::super::graph_laplacian::GraphLaplacian;
+use super::CellUnion;
+use std::f64::consts::{PI, TAU};
+
+/// The area ratio of the map that keeps the lengths of this loop: infinite where there is none in doubles.
+pub(super) fn area_ratio(union: &CellUnion, outer: usize) -> f64 {
+    log_scales(union, outer).map_or(f64::INFINITY, |a| union.ratio(|i, _| (2.0 * a[i]).exp()))
+}
+
+/// Whether that map hardly covers itself.
+pub(super) fn lies_flat(union: &CellUnion, outer: usize) -> bool {
+    let Some(scales) = log_scales(union, outer) else { return false };
+    let outline = laid_out(union, outer, &scales);
+    overlap(&outline) <= OVERLAP
+}
+
+/// Per cell, the logarithm of the scale of lengths.
+fn log_scales(union: &CellUnion, outer: usize) -> Option<Vec<f64>> {
+    let holes = union.loops.len() - 1;
+    let mut laplacian = GraphLaplacian::new(union.cells() + holes);
+    union.links.iter().for_each(|(pair, w)| laplacian.add_edge(*pair, *w));
+    for (i, curvature) in curvatures(union).into_iter().enumerate() {
+        laplacian.add_load(i as u32, [-curvature, 0.0]);
+    }
+    let mut node = union.cells() as u32;
+    for (l, runs) in union.runs.iter().enumerate() {
+        for run in runs {
+            let (cell, conductance) = (union.unknown(run.cell), run.length / union.reach(run));
+            if l == outer {
+                laplacian.add_dirichlet(cell, conductance, [0.0; 2]);
+            } else {
+                laplacian.add_edge([cell, node], conductance);
+            }
+        }
+        if l != outer {
+            laplacian.add_load(node, [-(TAU + turning(union, &union.loops[l])), 0.0]);
+            node += 1;
+        }
+    }
+    Some(laplacian.solve()?.into_iter().map(|a| a[0]).collect())
+}
+
+/// Per cell its curvature: the angle defects inside, and its share of those at the ends and between the ends of its arcs, as
+/// far as these lie inside the union.
+fn curvatures(union: &CellUnion) -> Vec<f64> {
+    let complex = union.complex;
+    let mut at_boundary: Vec<u32> = union.loops.iter().flatten().map(|a| complex.arcs[*a as usize].from).collect();
+    at_boundary.sort_unstable();
+    let of_cell = |cell: &u32| {
+        let mut curvature = complex.cells[*cell as usize].curvature;
+        for a in union.graph.arcs(*cell) {
+            let Some(twin) = union.inner_twin(a) else { continue };
+            let (arc, beyond) = (&complex.arcs[a as usize], &complex.arcs[twin as usize]);
+            // Where the boundary between two cells is crooked and the surface is flat, both turn by the same, and to either side.
+            curvature += 0.5 * (arc.turning + beyond.turning);
+            if at_boundary.binary_search(&arc.from).is_err() {
+                let corner = complex.corners[arc.from as usize];
+                curvature += corner.curvature / f64::from(corner.arcs);
+            }
+        }
+        curvature
+    };
+    union.dofs.free().iter().map(of_cell).collect()
+}
+
+/// By how much a loop turns to the left on the surface.
+fn turning(union: &CellUnion, boundary_loop: &[u32]) -> f64 {
+    let mut before = boundary_loop[boundary_loop.len() - 1];
+    let mut sum = 0.0;
+    for arc in boundary_loop {
+        sum += turning_at(union, before, *arc) + union.complex.arcs[*arc as usize].turning;
+        before = *arc;
+    }
+    sum
+}
+
+/// By how much the boundary turns at the corner between two half-arcs of it.
+fn turning_at(union: &CellUnion, arriving: u32, leaving: u32) -> f64 {
+    let arcs = &union.complex.arcs;
+    let mut side = arcs[arriving as usize].next;
+    let mut angle = arcs[side as usize].angle;
+    // Around the corner, cell by cell: ends at the boundary.
+    while side != leaving {
+        let Some(twin) = union.inner_twin(side) else { break };
+        side = arcs[twin as usize].next;
+        angle += arcs[side as usize].angle;
+    }
+    PI - angle
+}
+
+/// Half-arcs are laid out in so many pieces. Crooked ones are rounded off by this.
+const PIECES: usize = 4;
+
+/// The outer loop in the plane: its length kept, turned by the derivative of the logarithmic scale across it.
+fn laid_out(union: &CellUnion, outer: usize, scales: &[f64]) -> Vec<[f64; 2]> {
+    let arcs = &union.complex.arcs;
+    let boundary_loop = &union.loops[outer];
+    // Per unit of length, along each run.
+    let mut bends = union.runs[outer].iter().map(|run| -scales[union.unknown(run.cell) as usize] / union.reach(run));
+    let mut before = boundary_loop[boundary_loop.len() - 1];
+    let mut bend = 0.0;
+    let (mut at, mut direction) = ([0.0; 2], 0.0_f64);
+    let mut outline = Vec::with_capacity(PIECES * boundary_loop.len());
+    for (i, a) in boundary_loop.iter().enumerate() {
+        let arc = &arcs[*a as usize];
+        if i == 0 || arcs[before as usize].cell != arc.cell {
+            bend = bends.next().unwrap_or(0.0);
+        }
+        direction += turning_at(union, before, *a);
+        let (step, turn) = (arc.length / PIECES as f64, (arc.turning + bend * arc.length) / PIECES as f64);
+        for _ in 0..PIECES {
+            direction += 0.5 * turn;
+            outline.push(at);
+            at = [at[0] + step * direction.cos(), at[1] + step * direction.sin()];
+            direction += 0.5 * turn;
+        }
+        before = *a;
+    }
+    closed(outline, at)
+}
+
+/// The outline moved so that it ends where it began: what is missing is distributed evenly.
+fn closed(mut outline: Vec<[f64; 2]>, end: [f64; 2]) -> Vec<[f64; 2]> {
+    let count = outline.len() as f64;
+    for (i, p) in outline.iter_mut().enumerate() {
+        let share = i as f64 / count;
+        *p = [p[0] - share * end[0], p[1] - share * end[1]];
+    }
+    outline
+}
+
+/// The largest share of the plane inside an outline that may be covered more than once. By experience.
+const OVERLAP: f64 = 0.05;
+
+/// Lines on which that is looked at.
+const LINES: usize = 48;
+
+/// The share of the plane inside an outline that it surrounds more than once, or the wrong way round: on some lines across it.
+fn overlap(outline: &[[f64; 2]]) -> f64 {
+    let (low, high) = outline.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[1]), h.max(p[1])));
+    let (mut inside, mut wrong) = (0.0, 0.0);
+    let mut crossings: Vec<(f64, i32)> = Vec::new();
+    for line in 0..LINES {
+        let y = low + (high - low) * (line as f64 + 0.5) / LINES as f64;
+        crossings.clear();
+        let following = outline.iter().cycle().skip(1);
+        for (p, q) in outline.iter().zip(following) {
+            if (p[1] <= y) != (q[1] <= y) {
+                let x = p[0] + (q[0] - p[0]) * (y - p[1]) / (q[1] - p[1]);
+                crossings.push((x, if q[1] > p[1] { -1 } else { 1 }));
+            }
+        }
+        crossings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut winding = 0;
+        for pair in crossings.windows(2) {
+            winding += pair[0].1;
+            let width = pair[1].0 - pair[0].0;
+            inside += if winding == 0 { 0.0 } else { width };
+            wrong += if winding == 0 || winding == 1 { 0.0 } else { width };
+        }
+    }
+    if inside > 0.0 { wrong / inside } else { 1.0 }
+}
