@@ -4,7 +4,6 @@ use crate::formats::gmsh;
 use crate::report::ExportReport;
 use crate::result_files;
 use planish_core::atlas::Chart;
-use planish_core::certified::BoundaryFound;
 use planish_core::certified::NARROW;
 use planish_core::evaluate::Plane;
 use planish_core::map::natural::{Natural, natural};
@@ -280,8 +279,8 @@ fn stretches(certified: &CertifiedChart, linear: &LinearAtlas, distortion: &Summ
         return true;
     }
     let is_quick = area_of(chart) < QUICK * size * size && distortion.area_ratio < EVEN;
-    let is_natural = certified.provenance().boundary == BoundaryFound::Natural
-        || linear.straight_charts().binary_search(&chart.id()).is_ok();
+    let is_natural =
+        certified.provenance().boundary.is_own() || linear.straight_charts().binary_search(&chart.id()).is_ok();
     distortion.conformal_p99 > if is_quick && !is_natural { BENT } else { STRETCHED }
 }
 

@@ -169,11 +169,14 @@ fn what_can_be_laid_out_flat_is_not_stretched() {
 }
 
 #[test]
-fn a_ramp_of_two_turns_that_would_cover_itself_is_mapped_to_the_disk() {
+fn a_ramp_of_two_turns_that_would_cover_itself_is_bent_open() {
     let charts = naturally(&shapes::ramp(24, 48));
     let [chart] = &charts[..] else { panic!("{} charts", charts.len()) };
-    assert_eq!(chart.provenance().boundary, BoundaryFound::Circle { why_none: Some(NoNatural::Crossing) });
-    assert_eq!(chart.map().certificate().boundary, BoundaryArgument::StarShaped);
+    assert_eq!(chart.provenance().boundary, BoundaryFound::Freed { why_none: NoNatural::Crossing });
+    assert_eq!(chart.provenance().linear.method, Method::Isometric);
+    assert_eq!(chart.map().certificate().boundary, BoundaryArgument::Simple);
+    let on_disk = job(whole(&shapes::ramp(24, 48)), 1e6).run(&NoMonitor).expect("maps");
+    assert!(chart.distortion().conformal_p99 < on_disk[0].distortion().conformal_p99);
     // Less than a turn of it lies beside itself.
     let short = naturally(&shapes::ramp(24, 20));
     assert!(short.len() == 1 && short[0].provenance().boundary == BoundaryFound::Natural);

@@ -9,12 +9,20 @@
 //!   a free boundary: what can be unrolled without stretching is. On the four parts of each triangle: coarse needles fold
 //!   without them.
 //!
-//! Neither is one-to-one by construction. What the certifier does not prove is no [`Natural`].
+//! Where neither is, a map may be unfolded inside the boundary of one ([`unfolded_start()`]), or the boundary is freed from the
+//! disk and the map brought near an isometry ([`freed_start()`]).
+//!
+//! Neither of the first two is one-to-one by construction. What the certifier does not prove is no [`Natural`].
 
 mod boundary_first;
+mod clearance;
 mod conformal;
+mod descent;
+mod freed;
+mod isotropic;
 mod projection;
 mod start;
+mod unfolded;
 mod upright;
 
 use crate::atlas::Chart;
@@ -26,7 +34,7 @@ use crate::measure::quantiles::{Weighted, quantiles};
 use crate::monitor::{Interrupted, Monitor};
 pub use conformal::{conformal, conformal_by_corners, spectral_conformal};
 pub use projection::projection;
-pub use start::{NaturalStart, NoNatural, natural_start};
+pub use start::{NaturalStart, NoNatural, freed_start, natural_start, unfolded_start};
 
 /// Maps are scaled into a disk of this radius: well within what the grid holds exactly.
 const RADIUS: f64 = 0.984375;
