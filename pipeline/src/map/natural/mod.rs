@@ -63,7 +63,7 @@ const UNROLLED: usize = 20_000;
 
 /// The largest area ratio of a natural map: meshers cut off what is shrunk, as are steep walls of less than a hundredth
 /// of the area where a chart is projected (pins_instanced, at 303: 38 elements below gamma 0.1).
-const EVEN: f64 = 100.0;
+pub(crate) const EVEN: f64 = 100.0;
 
 /// A natural map that stretches `chart` less than `on_disk`, the conformal distortion that its map on
 /// the disk does not exceed on 99 % of the area; none where there is none, or that is not found by reasonable means.
