@@ -3,10 +3,13 @@
 //! Of each vertex v and each side s of the boundary that are not neighbours (Smith and Schaefer 2015, *Bijective
 //! parameterization with free boundaries*, doi 10.1145/2766947, equation 6),
 //!
-//!     h^2 max(0, r / |v - s| - 1)^2,    r = share min(REACH h, distance of v and s in space / 2),    h the mean side.
+//! ```text
+//! h^2 max(0, r / |v - s| - 1)^2,    r = share min(REACH h, distance of v and s in space / 2),    h the mean side.
+//! ```
 //!
-//! The second term of r is not theirs: sides that lie near each other on the surface do so in the plane, and a flat sheet is
-//! at rest. Nor is the share: while a map is far from an isometry, lengths in space say little of those in the plane. Loops that cross are not told from others by this: see [`Clearance::is_kept`].
+//! The second term of r is not theirs: sides that lie near each other on the surface do so in the plane, and a flat
+//! sheet is at rest. Nor is the share: while a map is far from an isometry, lengths in space say little of those in the
+//! plane. Loops that cross are not told from others by this: see [`Clearance::is_kept`].
 
 use super::isotropic::Local;
 use super::{Around, RADIUS};
@@ -69,8 +72,8 @@ impl Clearance {
         Self { mean: length / sides.len() as f64, loops, sides, points }
     }
 
-    /// What is near at `uv`, in an order that depends on nothing else, with the barrier reaching a `share` (0 to 1) as far as it
-    /// does at most.
+    /// What is near at `uv`, in an order that depends on nothing else, with the barrier reaching a `share` (0 to 1) as
+    /// far as it does at most.
     pub fn near(&self, uv: &[[f64; 2]], share: f64) -> Vec<Near> {
         let half = 0.5 * share * REACH * self.mean;
         let mut near = Vec::new();

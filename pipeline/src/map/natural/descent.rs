@@ -15,12 +15,13 @@ const SUFFICIENT: f64 = 1e-4;
 /// How often a step is halved.
 const HALVINGS: u32 = 30;
 
-/// Vertices are held where they are by springs as strong as this together, in the unit of energy per area: moves and turns of
-/// the whole cost no energy. By experience: far below what holds the parts of a chart together, far above rounding.
+/// Vertices are held where they are by springs as strong as this together, in the unit of energy per area: moves and
+/// turns of the whole cost no energy. By experience: far below what holds the parts of a chart together, far above
+/// rounding.
 const HOLD: f64 = 1e-4;
 
-/// Where rounding makes the matrix singular its diagonal is raised by this share, then by a hundred times as much, and so
-/// on, up to the largest. As in untangling.
+/// Where rounding makes the matrix singular its diagonal is raised by this share, then by a hundred times as much, and
+/// so on, up to the largest. As in untangling.
 const FIRST_SHIFT: f64 = 1e-12;
 const LAST_SHIFT: f64 = 1e-2;
 

@@ -1,13 +1,16 @@
 //! Energies of P1 maps of triangles that do not depend on directions: value, gradient, and a positive Hessian.
 //!
-//! In complex coordinates of the plane and of the triangle as it is in space, a linear map is f(w) = P w + N conj w. With
+//! In complex coordinates of the plane and of the triangle as it is in space, a linear map is f(w) = P w + N conj w.
+//! With
 //!
-//!     S = |P|^2 + |N|^2 = |J|_F^2 / 2,    d = |P|^2 - |N|^2 = det J,
+//! ```text
+//! S = |P|^2 + |N|^2 = |J|_F^2 / 2,    d = |P|^2 - |N|^2 = det J,
+//! ```
 //!
-//! the energy is sum_T A_T F(S, d), here with F linear in S. Its Hessian in (P, N) has a closed form: the lengths |P| and |N|
-//! make a block of two by two, and the directions across them an eigenvalue each (Smith, De Goes and Kim 2019, *Analytic
-//! eigensystems for isotropic distortion energies*, doi 10.1145/3241041, have the same for singular values |P| + |N| and
-//! |P| - |N|). What is negative is set to zero.
+//! the energy is sum_T A_T F(S, d), here with F linear in S. Its Hessian in (P, N) has a closed form: the lengths |P|
+//! and |N| make a block of two by two, and the directions across them an eigenvalue each (Smith, De Goes and Kim 2019,
+//! *Analytic eigensystems for isotropic distortion energies*, doi 10.1145/3241041, have the same for singular values
+//! |P| + |N| and |P| - |N|). What is negative is set to zero.
 
 use crate::atlas::Chart;
 use crate::mesh::TriangleShape;
@@ -29,8 +32,8 @@ pub(super) trait Density: Copy {
     fn at(&self, sum: f64, det: f64) -> Derivatives;
 }
 
-/// |J|_F^2 + |J^-1|_F^2 = 2 S (1 + 1 / d^2), infinite where d is not positive; 4 for isometries, and larger for all others (Smith
-/// and Schaefer 2015, *Bijective parameterization with free boundaries*, doi 10.1145/2766947).
+/// |J|_F^2 + |J^-1|_F^2 = 2 S (1 + 1 / d^2), infinite where d is not positive; 4 for isometries, and larger for all
+/// others (Smith and Schaefer 2015, *Bijective parameterization with free boundaries*, doi 10.1145/2766947).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SymmetricDirichlet;
 
@@ -48,9 +51,9 @@ impl Density for SymmetricDirichlet {
     }
 }
 
-/// (2 S + AREA (d^2 + 1)) / chi(d), chi(d) = (d + sqrt(d^2 + eps^2)) / 2: finite on triangles that are folded, and steep there
-/// (Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov 2021, *Foldover-free maps in 50 lines of code*, doi
-/// 10.1145/3450626.3459847).
+/// (2 S + AREA (d^2 + 1)) / chi(d), chi(d) = (d + sqrt(d^2 + eps^2)) / 2: finite on triangles that are folded, and
+/// steep there (Garanzha, Kaporin, Kudryavtseva, Protais, Ray and Sokolov 2021, *Foldover-free maps in 50 lines of
+/// code*, doi 10.1145/3450626.3459847).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Regularised {
     /// Width of the transition, > 0.
@@ -167,7 +170,8 @@ impl Elements {
         image / self.area()
     }
 
-    /// The factor by which a map whose triangles all turn left is to be scaled for the least symmetric Dirichlet energy.
+    /// The factor by which a map whose triangles all turn left is to be scaled for the least symmetric Dirichlet
+    /// energy.
     pub fn best_scale(&self, uv: &[[f64; 2]]) -> f64 {
         let (mut direct, mut inverse) = (0.0, 0.0);
         for e in &self.elements {

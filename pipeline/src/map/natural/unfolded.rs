@@ -1,7 +1,8 @@
 //! Unfolds a P1 map inside a boundary that is given.
 //!
-//! From a map with folded triangles, by the energy of Garanzha and co-workers (2021, doi 10.1145/3450626.3459847), which is finite
-//! there: its eps falls with the worst triangle. What is unfolded goes on down the symmetric Dirichlet energy.
+//! From a map with folded triangles, by the energy of Garanzha and co-workers (2021, doi 10.1145/3450626.3459847),
+//! which is finite there: its eps falls with the worst triangle. What is unfolded goes on down the symmetric Dirichlet
+//! energy.
 
 use super::descent::Descent;
 use super::isotropic::{Elements, Regularised, SymmetricDirichlet};
@@ -10,17 +11,19 @@ use crate::fem::dofs::Dofs;
 use crate::fem::sparse;
 use crate::monitor::Monitor;
 
-/// The largest number of steps for unfolding, and after that. By experience, on disks whose inner vertices are moved about.
+/// The largest number of steps for unfolding, and after that. By experience, on disks whose inner vertices are moved
+/// about.
 const STEPS: usize = 60;
 const STEPS_AFTER: usize = 10;
 
-/// The largest eps, the least, and the share of the worst determinant that it follows: about as patches are pulled over when
-/// they are untangled.
+/// The largest eps, the least, and the share of the worst determinant that it follows: about as patches are pulled over
+/// when they are untangled.
 const WIDEST: f64 = 1.0;
 const NARROWEST: f64 = 1e-4;
 const OF_WORST: f64 = 0.2;
 
-/// The uv of the vertices of `chart` from `uv` on, those of the boundary where they are; none where triangles stay folded.
+/// The uv of the vertices of `chart` from `uv` on, those of the boundary where they are; none where triangles stay
+/// folded.
 ///
 /// # Errors
 /// The system cannot be solved, or interrupted.
