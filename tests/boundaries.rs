@@ -1,7 +1,7 @@
 //! `--boundary`: which boundary charts have in the plane, that it is told, and that it is proven again.
 
 use crate::support::{Out, fixture, planish};
-use planish::report::{ChartReport, Report};
+use planish::report::{BoundaryShape, ChartReport, Report};
 use planish::settings::Boundary;
 use planish_core::mesh::TriangleSoup;
 use planish_core::shapes;
@@ -34,7 +34,7 @@ fn a_plate_keeps_its_shape_by_default_and_is_mapped_to_the_disk_on_demand() {
     assert_eq!(out.run(&[&fixture(name)], &["-q"]).code, Some(0));
     let report = out.report(name);
     let (chart, argument) = only_chart(&report);
-    assert_eq!((report.settings.boundary, chart.boundary.shape), (Some(Boundary::Natural), Boundary::Natural));
+    assert_eq!((report.settings.boundary, chart.boundary.shape), (Some(Boundary::Natural), BoundaryShape::Natural));
     assert_eq!((argument, chart.certificate.boundary.holes, chart.loops), ("simple", 3, 4));
     assert_eq!((chart.linear.method.as_str(), &chart.boundary.reason), ("conformal", &None));
     is_proven_again(&out, name);
@@ -45,7 +45,7 @@ fn a_plate_keeps_its_shape_by_default_and_is_mapped_to_the_disk_on_demand() {
     let (disk, argument) = only_chart(&on_disk);
     assert_eq!(
         (on_disk.settings.boundary, disk.boundary.shape, argument),
-        (Some(Boundary::Circle), Boundary::Circle, "star_shaped")
+        (Some(Boundary::Circle), BoundaryShape::Circle, "star_shaped")
     );
     assert_eq!(disk.boundary.reason, None, "nobody asked for another");
     assert!(chart.distortion.conformal_p99 < disk.distortion.conformal_p99);
@@ -53,13 +53,14 @@ fn a_plate_keeps_its_shape_by_default_and_is_mapped_to_the_disk_on_demand() {
 }
 
 #[test]
-fn a_ramp_that_would_cover_itself_is_on_the_disk_and_says_why() {
+fn a_ramp_that_would_cover_itself_is_freed_from_the_disk_and_says_why() {
     let out = Out::new();
     // Features off, so that its turns are one chart.
     let (ended, report) = out.run_bytes_with("ramp.obj", &obj(&shapes::ramp(24, 48)), &["--feature-angle", "off"]);
     assert_eq!(ended.code, Some(0), "{}", ended.err);
     let (chart, argument) = only_chart(&report);
-    assert_eq!((chart.boundary.shape, argument), (Boundary::Circle, "star_shaped"));
+    assert_eq!((chart.boundary.shape, argument), (BoundaryShape::Freed, "simple"));
+    assert_eq!(chart.linear.method, "isometric");
     assert_eq!(chart.boundary.reason.as_deref(), Some("crossing"));
     assert!(chart.boundary.message.as_ref().is_some_and(|m| m.contains("crosses or touches")));
     is_proven_again(&out, "ramp.obj");
@@ -71,7 +72,7 @@ fn the_wall_of_a_cylinder_is_unrolled_in_two_strips() {
     let (ended, report) = out.run_bytes("wall.obj", &obj(&shapes::tube(36, 1, 5.0)));
     assert_eq!((ended.code, report.charts.len()), (Some(0), 2), "{}", ended.err);
     for chart in &report.charts {
-        assert_eq!((chart.boundary.shape, chart.loops), (Boundary::Natural, 1));
+        assert_eq!((chart.boundary.shape, chart.loops), (BoundaryShape::Natural, 1));
         let distortion = &chart.distortion;
         assert!(distortion.conformal_p99 < 1.001 && distortion.area_ratio < 1.001, "{distortion:?}");
         assert_eq!(chart.quadratic.as_ref().map(|q| q.invalid), Some(0));

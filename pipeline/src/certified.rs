@@ -47,11 +47,26 @@ pub struct CertifiedChart {
 pub enum BoundaryFound {
     /// That of a conformal map with a free boundary, in chords.
     Natural,
+    /// Freed from the disk, so that the map is near an isometry, in chords.
+    Freed {
+        /// Why it is not the natural one.
+        why_none: NoNatural,
+    },
     /// The unit circle.
     Circle {
         /// Why it is not the natural one, where that was asked for.
         why_none: Option<NoNatural>,
     },
+}
+
+impl BoundaryFound {
+    /// Whether the boundary is one of the chart's own, not the circle: it consists of chords, along holes, too.
+    pub fn is_own(self) -> bool {
+        match self {
+            Self::Natural | Self::Freed { .. } => true,
+            Self::Circle { .. } => false,
+        }
+    }
 }
 
 /// How a map was found.

@@ -52,7 +52,7 @@
 //! * The map is a local minimiser of the energy, within the maps whose jacobians have positive Bernstein coefficients: a
 //!   better one may exist.
 //! * Triangles of the input are flat in space, so far. Not every chart has a natural boundary that is one-to-one and even;
-//!   the others have the circle, and say why ([`certified::BoundaryFound`]).
+//!   the others have one that is freed from the circle, or that, and say why ([`certified::BoundaryFound`]).
 //!
 //! # Source
 //!

@@ -1,11 +1,10 @@
 //! From the core's numbers to the report's.
 
 use super::{
-    Boundary, Certificate, ChartBoundary, ChartReport, Counts, Distortion, Linear, Quadratic, RepairedSurface, Repairs,
-    Seam, Seams, Surface, Untangle,
+    Boundary, BoundaryShape, Certificate, ChartBoundary, ChartReport, Counts, Distortion, Linear, Quadratic,
+    RepairedSurface, Repairs, Seam, Seams, Surface, Untangle,
 };
 use crate::formats::layout::{Placement, layout};
-use crate::settings;
 use planish_core::atlas::Chart;
 use planish_core::certified::BoundaryFound;
 use planish_core::certify::{BoundaryArgument, CertifiedMap, PlanarMap};
@@ -193,11 +192,10 @@ fn untangling(report: &untangle::Report, det_min: f64) -> Untangle {
 }
 
 fn chart_boundary(found: BoundaryFound) -> ChartBoundary {
-    let why_none = match found {
-        BoundaryFound::Natural => {
-            return ChartBoundary { shape: settings::Boundary::Natural, reason: None, message: None };
-        }
-        BoundaryFound::Circle { why_none } => why_none,
+    let (shape, why_none) = match found {
+        BoundaryFound::Natural => (BoundaryShape::Natural, None),
+        BoundaryFound::Freed { why_none } => (BoundaryShape::Freed, Some(why_none)),
+        BoundaryFound::Circle { why_none } => (BoundaryShape::Circle, why_none),
     };
     let code = |why: &NoNatural| match why {
         NoNatural::Folded { .. } => "folded",
@@ -207,7 +205,7 @@ fn chart_boundary(found: BoundaryFound) -> ChartBoundary {
         NoNatural::Unsolvable => "unsolvable",
     };
     ChartBoundary {
-        shape: settings::Boundary::Circle,
+        shape,
         reason: why_none.as_ref().map(|why| code(why).to_owned()),
         message: why_none.map(|why| why.to_string()),
     }
@@ -227,6 +225,8 @@ fn linear_method(method: linear::Method) -> &'static str {
         linear::Method::MeanValue => "mean_value",
         linear::Method::Conformal => "conformal",
         linear::Method::Projection => "projection",
+        linear::Method::Unfolded => "unfolded",
+        linear::Method::Isometric => "isometric",
     }
 }
 

@@ -299,12 +299,34 @@ fn one() -> f64 {
     1.0
 }
 
+/// Which boundary a chart has in the plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BoundaryShape {
+    /// That of a map with a free boundary that is conformal.
+    Natural,
+    /// Freed from the disk, so that the map is near an isometry.
+    Freed,
+    /// The unit circle.
+    Circle,
+}
+
+impl BoundaryShape {
+    /// Whether it consists of chords.
+    pub fn is_in_chords(self) -> bool {
+        match self {
+            Self::Natural | Self::Freed => true,
+            Self::Circle => false,
+        }
+    }
+}
+
 /// The boundary of a chart in the plane. Results that say nothing have the circle.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ChartBoundary {
     /// Which one it is.
-    pub shape: settings::Boundary,
-    /// Why it is the circle although the natural one was asked for: `folded`, `crossing`, `uneven`, `stretched`,
+    pub shape: BoundaryShape,
+    /// Why it is freed, or the circle, although the natural one was asked for: `folded`, `crossing`, `uneven`, `stretched`,
     /// `unsolvable`; else null.
     pub reason: Option<String>,
     /// The same in words.
@@ -313,7 +335,7 @@ pub struct ChartBoundary {
 
 impl Default for ChartBoundary {
     fn default() -> Self {
-        Self { shape: settings::Boundary::Circle, reason: None, message: None }
+        Self { shape: BoundaryShape::Circle, reason: None, message: None }
     }
 }
 
@@ -324,7 +346,8 @@ pub struct Linear {
     pub folded: usize,
     /// Edges whose weight was changed.
     pub edges_changed: usize,
-    /// `harmonic`, `m_matrix` or `mean_value`; with a natural boundary `conformal` or `projection`, too.
+    /// `harmonic`, `m_matrix` or `mean_value`; with a natural boundary `conformal`, `projection` or `unfolded`,
+    /// too; with a freed one `isometric`.
     pub method: String,
 }
 

@@ -13,7 +13,7 @@ use crate::outcome::{Reason, Status};
 use crate::output::ledger;
 use crate::report::{self, ChartReport, Output, Report, certificate, chart_checksum};
 use crate::result_files;
-use crate::settings::{Boundary, ExportTarget};
+use crate::settings::ExportTarget;
 use crate::stages::guard;
 use planish_core::certify::{self, PlanarMap, prove};
 use planish_core::grid::GridPoint;
@@ -242,8 +242,8 @@ fn check_chart(grid: &Grid, index: usize, chart: &ChartReport) -> Result<String,
     let map = planar_map(grid, &cells, chart).map_err(|problem| wrong(&problem))?;
     let checksum = chart_checksum(&map);
     let proof = prove(map).map_err(|e| unproven(grid, &cells, id, e))?;
-    if chart.boundary.shape == Boundary::Natural && !proof.map().boundary_is_in_chords() {
-        return Err(wrong("its boundary does not consist of chords, as natural ones do"));
+    if chart.boundary.shape.is_in_chords() && !proof.map().boundary_is_in_chords() {
+        return Err(wrong("its boundary does not consist of chords, as natural and freed ones do"));
     }
     if checksum != chart.certificate.checksum {
         return Err(wrong("the map is one-to-one, but not the one that was certified (checksum differs)"));

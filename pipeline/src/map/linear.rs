@@ -40,6 +40,10 @@ pub enum Method {
     Conformal,
     /// Projected along the mean of the normals.
     Projection,
+    /// Unfolded inside a natural boundary.
+    Unfolded,
+    /// Nearest to an isometry, with the boundary freed.
+    Isometric,
 }
 
 /// A P1 map in which no triangle is folded.

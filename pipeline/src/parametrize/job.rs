@@ -10,7 +10,7 @@ use crate::grid::GridPoint;
 use crate::map::boundary::{Boundary, Mids};
 use crate::map::filled::FilledChart;
 use crate::map::linear::{self, LinearMap, flatten_ear_arcs, linear_map};
-use crate::map::natural::{NaturalStart, NoNatural, natural_start};
+use crate::map::natural::{EVEN, NaturalStart, NoNatural, freed_start, natural_start, unfolded_start};
 use crate::map::quadratic::{QuadraticMap, min_det, quadratic_map};
 use crate::measure::distortion;
 use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
@@ -69,10 +69,25 @@ impl Maps {
     /// elevated. Noise makes many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
     pub(super) fn conformal_p99(&self, chart: &Chart) -> f64 {
         let nodes = match &self.harmonic {
-            Some(Ok(map)) if !chart.holes().is_empty() && self.boundary != BoundaryFound::Natural => map.nodes(),
+            Some(Ok(map)) if !chart.holes().is_empty() && !self.boundary.is_own() => map.nodes(),
             _ => &self.start,
         };
         distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]))
+    }
+
+    /// The same, as it is to be expected when the map is untangled, with holes or without: that of the harmonic map, and where
+    /// that is invalid on a hundredth of the area, more than that of the linear map.
+    fn expected_p99(&self, chart: &Chart) -> f64 {
+        let of_nodes =
+            |nodes: &[GridPoint]| distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]));
+        let of_start = of_nodes(&self.start);
+        match &self.harmonic {
+            Some(Ok(map)) => {
+                let of_harmonic = of_nodes(map.nodes());
+                if of_harmonic < f64::MAX { of_harmonic } else { UNTANGLED * of_start }
+            }
+            Some(Err(_)) | None => of_start,
+        }
     }
 }
 
@@ -86,6 +101,10 @@ impl Maps {
         invalid as f64 / chart.triangles().len() as f64
     }
 }
+
+/// How much more than linear maps those stretch at least that are untangled where a hundredth of the area of the harmonic one is
+/// invalid. By experience: 2.8 times in gebco_seabed_55cl, 250 and more in milk_truck and lucy_100k.
+const UNTANGLED: f64 = 2.0;
 
 /// Why a chart cannot be mapped as a whole. All but the last mean: split it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -141,11 +160,15 @@ impl ChartJob {
         while let Some(chart) = waiting.pop() {
             let maps = match cutter.attempt(&chart)? {
                 Attempt::Mapped(maps) => {
-                    if let Some(parts) = cutter.parts(&chart, &maps)? {
-                        mapped.extend(parts.into_iter().map(|(chart, maps)| MappedChart { chart, settings, maps }));
-                        continue;
+                    let parts = match cutter.parts(&chart, &maps)? {
+                        Some(parts) => parts,
+                        None => vec![(chart, *maps)],
+                    };
+                    for (chart, maps) in parts {
+                        let maps = off_circle(&chart, &settings, maps, monitor)?;
+                        mapped.push(MappedChart { chart, settings, maps });
                     }
-                    *maps
+                    continue;
                 }
                 Attempt::Split(parts) => {
                     waiting.extend(parts.into_iter().rev());
@@ -193,7 +216,7 @@ impl MappedChart {
         let mut certified = Vec::new();
         let mut waiting = vec![self];
         while let Some(MappedChart { chart, maps, .. }) = waiting.pop() {
-            let proven = untangle_and_certify(maps, monitor)?;
+            let proven = untangle_and_certify(&chart, maps, largest, monitor)?;
             let ratio = distortion::area_ratio(&chart, &proven.map);
             let parts = if ratio > largest {
                 let scales = distortion::log_scales(&chart, &proven.map);
@@ -219,7 +242,7 @@ impl MappedChart {
 /// [`MapError`]: the chart must be split, as [`ChartJob::run`] does.
 pub fn parametrize_chart(chart: Chart, order: Order) -> Result<CertifiedChart, MapError> {
     let maps = map_whole(&chart, order, BoundaryShape::Circle, f64::INFINITY, &NoMonitor)?;
-    let proven = untangle_and_certify(maps, &NoMonitor)?;
+    let proven = untangle_and_certify(&chart, maps, f64::INFINITY, &NoMonitor)?;
     let ratio = distortion::area_ratio(&chart, &proven.map);
     Ok(proven.of(chart, ratio))
 }
@@ -287,13 +310,45 @@ pub(super) fn map_whole(
             Ok(_) | Err(_) => {}
         }
     }
-    FeasibleStart::natural(start).mapped(order, monitor)
+    FeasibleStart::off_circle(start, BoundaryFound::Natural).mapped(order, monitor)
 }
 
 /// Where a natural map stretches a hundredth of the area more than this, that of the disk is looked at, too: rings of
 /// needles in cad_rear_case have natural maps at 1,000 to 90,000, all of whose triangles are invalid. By experience: the
 /// disk stretches less than this only what is round already.
 const STRETCHED: f64 = 5.0;
+
+/// The maps of a chart that has its boundary on the circle for want of a natural one, with a boundary of its own where that
+/// stretches less: a natural one inside which a linear map was unfolded, or one that is freed from the disk. This comes
+/// after cutting: parts with natural boundaries are better still.
+fn off_circle(chart: &Chart, settings: &ChartSettings, maps: Maps, monitor: &dyn Monitor) -> Result<Maps, ChartError> {
+    let BoundaryFound::Circle { why_none: Some(why_none) } = maps.boundary else { return Ok(maps) };
+    let on_disk = maps.expected_p99(chart);
+    if on_disk <= ROUND || chart.triangles().len() > FREED {
+        return Ok(maps);
+    }
+    let largest = settings.decompose.max_area_ratio;
+    let is_better = |start: &NaturalStart| start.conformal_p99 < on_disk;
+    if let NoNatural::Folded { .. } = why_none
+        && let Some(start) = unfolded_start(chart, largest, monitor)?.filter(is_better)
+    {
+        return Ok(FeasibleStart::off_circle(start, BoundaryFound::Natural).mapped(settings.order, monitor)?);
+    }
+    match freed_start(chart, maps.linear.uv(), largest, monitor)?.filter(is_better) {
+        Some(start) => {
+            let freed = FeasibleStart::off_circle(start, BoundaryFound::Freed { why_none });
+            Ok(freed.mapped(settings.order, monitor)?)
+        }
+        None => Ok(maps),
+    }
+}
+
+/// Charts that the disk stretches no more than this on all but a hundredth of their area stay there. By experience: what is as
+/// round (rings of CAD parts at 1.1, halves of rocker_arm_g1 at 1.5) is stretched more by a map near an isometry.
+const ROUND: f64 = 2.0;
+
+/// Charts with more triangles are not freed: of 10,000 it takes a second or two. By experience, as larger ones are rare.
+const FREED: usize = 20_000;
 
 /// As [`map_whole`], with the boundary on the circle. `why_none` is the reason, where the natural one was asked for.
 fn map_to_disk(
@@ -335,9 +390,10 @@ struct FeasibleStart {
 }
 
 impl FeasibleStart {
-    fn natural(start: NaturalStart) -> Self {
+    /// A start with a boundary that is not on the circle.
+    fn off_circle(start: NaturalStart, found: BoundaryFound) -> Self {
         let NaturalStart { filled, boundary, linear, nodes, certified, .. } = start;
-        Self { filled, boundary, linear, nodes, certified, found: BoundaryFound::Natural }
+        Self { filled, boundary, linear, nodes, certified, found }
     }
 
     /// All maps with this boundary, however they scale areas: that was looked at when it was chosen.
@@ -417,9 +473,14 @@ impl ProvenMap {
     }
 }
 
-/// Untangles the harmonic map, if there is one, and certifies the result; where that cannot be proven, the result is the
-/// feasible start.
-fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, Interrupted> {
+/// Untangles the harmonic map, if there is one, and certifies the result; where that cannot be proven, or the boundary is freed
+/// and the result stretches some triangle more than any is there or scales areas unevenly, it is the feasible start.
+fn untangle_and_certify(
+    chart: &Chart,
+    maps: Maps,
+    max_area_ratio: f64,
+    monitor: &dyn Monitor,
+) -> Result<ProvenMap, Interrupted> {
     let Maps { filled, linear, start, certified_start, harmonic, boundary } = maps;
     let linear =
         LinearSummary { folded: linear.folded(), edges_changed: linear.edges_changed(), method: linear.method() };
@@ -438,9 +499,21 @@ fn untangle_and_certify(maps: Maps, monitor: &dyn Monitor) -> Result<ProvenMap, 
     let energy = Dirichlet::new(&filled);
     let Untangled { nodes, hole_centres, mut report } = untangle(&filled, &energy, &start, &map, monitor)?;
     Checkpoint::new(monitor).end()?;
+    let largest = |map: &CertifiedMap| {
+        let map = map.map();
+        distortion::largest_conformal_of_nodes(chart, |f| map.cells[f].map(|n| map.nodes[n as usize]))
+    };
+    // The start of a freed map is the best that was found in P1, and no mere beginning. Where the harmonic map inside folds,
+    // single triangles come out of untangling that a mesher cannot follow: of cad_box_multi chart 0, at 590 where the p99 is 1.8.
+    let is_wanted = |map: &CertifiedMap| match boundary {
+        BoundaryFound::Freed { .. } => {
+            largest(map) <= largest(&certified_start) && distortion::area_ratio(chart, map) <= EVEN.min(max_area_ratio)
+        }
+        BoundaryFound::Natural | BoundaryFound::Circle { .. } => true,
+    };
     let certified = match prove(planar(&filled, &nodes, hole_centres)) {
-        Ok(certified) => certified,
-        Err(_) => {
+        Ok(certified) if is_wanted(&certified) => certified,
+        Ok(_) | Err(_) => {
             report = report.of_start(&filled, &start, &map);
             certified_start.clone()
         }

@@ -2,7 +2,10 @@ use super::*;
 use crate::atlas::Chart;
 use crate::certified::{BoundaryFound, CertifiedChart};
 use crate::certify::BoundaryArgument;
-use crate::map::linear::Method;
+use crate::map::boundary::{Boundary, Mids};
+use crate::map::filled::FilledChart;
+use crate::map::linear::{Method, flatten_ear_arcs, linear_map};
+use crate::map::quadratic::quadratic_map;
 use crate::map::natural::{self, NoNatural};
 use crate::monitor::NoMonitor;
 use crate::settings::{BoundaryShape, ChartSettings, Order};
@@ -165,25 +168,34 @@ fn what_can_be_laid_out_flat_is_not_stretched() {
 }
 
 #[test]
-fn a_ramp_of_two_turns_that_would_cover_itself_is_mapped_to_the_disk() {
+fn a_ramp_of_two_turns_that_would_cover_itself_is_bent_open() {
     let charts = naturally(&shapes::ramp(24, 48));
     let [chart] = &charts[..] else { panic!("{} charts", charts.len()) };
-    assert_eq!(chart.provenance().boundary, BoundaryFound::Circle { why_none: Some(NoNatural::Crossing) });
-    assert_eq!(chart.map().certificate().boundary, BoundaryArgument::StarShaped);
+    assert_eq!(chart.provenance().boundary, BoundaryFound::Freed { why_none: NoNatural::Crossing });
+    assert_eq!(chart.provenance().linear.method, Method::Isometric);
+    assert_eq!(chart.map().certificate().boundary, BoundaryArgument::Simple);
+    let on_disk = job(whole(&shapes::ramp(24, 48)), 1e6).run(&NoMonitor).expect("maps");
+    assert!(chart.distortion().conformal_p99 < on_disk[0].distortion().conformal_p99);
     // Less than a turn of it lies beside itself.
     let short = naturally(&shapes::ramp(24, 20));
     assert!(short.len() == 1 && short[0].provenance().boundary == BoundaryFound::Natural);
 }
 
 #[test]
-fn what_falls_back_to_the_circle_is_what_the_circle_gives() {
-    let cup = shapes::finger(12, 2);
-    let (fallen, asked) = (naturally(&cup), job(whole(&cup), 1e6).run(&NoMonitor).expect("maps"));
-    assert_eq!((fallen.len(), asked.len()), (1, 1));
-    let why = fallen[0].provenance().boundary;
-    assert!(matches!(why, BoundaryFound::Circle { why_none: Some(NoNatural::Uneven { .. }) }), "{why:?}");
-    assert_eq!(fallen[0].map().map(), asked[0].map().map());
-    assert_eq!(asked[0].provenance().boundary, BoundaryFound::Circle { why_none: None });
+fn on_the_circle_linear_and_harmonic_map_are_those_of_the_paper_bit_by_bit() {
+    for soup in [shapes::disk(9), shapes::disk_with_holes(13, 2), shapes::finger(12, 2)] {
+        let [certified] = &job(whole(&soup), 1e6).run(&NoMonitor).expect("maps")[..] else { panic!("one chart") };
+        assert_eq!(certified.provenance().boundary, BoundaryFound::Circle { why_none: None });
+        let filled = FilledChart::new(certified.chart());
+        let mut boundary = Boundary::circle(&filled, Mids::Arc);
+        let linear = linear_map(&filled, &boundary, &NoMonitor).expect("does not fold");
+        flatten_ear_arcs(&filled, &linear, &mut boundary);
+        let start = linear.degree_elevated(&filled, &boundary);
+        assert_eq!(certified.start().map().nodes, start[..filled.chart_nodes()]);
+        let harmonic = quadratic_map(&filled, &boundary, &NoMonitor).expect("solves");
+        assert!(harmonic.invalid().is_empty());
+        assert_eq!(certified.map().map().nodes, harmonic.nodes()[..filled.chart_nodes()]);
+    }
 }
 
 #[test]

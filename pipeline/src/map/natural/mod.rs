@@ -9,15 +9,23 @@
 //!   a free boundary: what can be unrolled without stretching is. On the four parts of each triangle: coarse needles fold
 //!   without them.
 //!
-//! Neither is one-to-one by construction. What the certifier does not prove is no [`Natural`].
+//! Where neither is, a map may be unfolded inside the boundary of one ([`unfolded_start()`]), or the boundary is freed from the
+//! disk and the map brought near an isometry ([`freed_start()`]).
+//!
+//! Neither of the first two is one-to-one by construction. What the certifier does not prove is no [`Natural`].
 
 mod boundary_first;
+mod clearance;
 mod conformal;
 mod dense;
+mod descent;
+mod freed;
+mod isotropic;
 mod laplace;
 mod placement;
 mod projection;
 mod start;
+mod unfolded;
 mod upright;
 
 use crate::atlas::Chart;
@@ -29,7 +37,7 @@ use crate::measure::quantiles::{Weighted, quantiles};
 use crate::monitor::{Interrupted, Monitor};
 pub use conformal::{conformal, conformal_by_corners, spectral_conformal};
 pub use projection::projection;
-pub use start::{NaturalStart, NoNatural, natural_start};
+pub use start::{NaturalStart, NoNatural, freed_start, natural_start, unfolded_start};
 
 /// Maps are scaled into a disk of this radius: well within what the grid holds exactly.
 const RADIUS: f64 = 0.984375;
@@ -58,7 +66,7 @@ const UNROLLED: usize = 20_000;
 
 /// The largest area ratio of a natural map: meshers cut off what is shrunk, as are steep walls of less than a hundredth
 /// of the area where a chart is projected (pins_instanced, at 303: 38 elements below gamma 0.1).
-const EVEN: f64 = 100.0;
+pub(crate) const EVEN: f64 = 100.0;
 
 /// A natural map that stretches `chart` less than `on_disk`, the conformal distortion that its map on
 /// the disk does not exceed on 99 % of the area; none where there is none, or that is not found by reasonable means.

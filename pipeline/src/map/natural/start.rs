@@ -6,8 +6,11 @@
 //! valid; so a start is asked for that is: a linear map with this boundary, or the conformal map itself, its degree elevated.
 
 use super::boundary_first::{Polygon, boundary_first};
+use super::clearance::Clearance;
+use super::freed::freed;
 use super::placement::doubled_area;
 use super::projection::projected;
+use super::unfolded::unfolded;
 use super::{EVEN, STEEP, conformal_by_corners, fitted_to_size, spectral_conformal};
 use crate::atlas::Chart;
 use crate::certify::{self, CertifiedMap, PlanarMap, prove};
@@ -15,7 +18,7 @@ use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::map::boundary::Boundary;
 use crate::map::filled::FilledChart;
-use crate::map::linear::{self, LinearMap, Method, linear_map};
+use crate::map::linear::{self, LinearMap, Method, harmonic_uv, linear_map};
 use crate::measure::distortion;
 use crate::monitor::{Checkpoint, Interrupted, Monitor};
 use crate::topology::VertexId;
@@ -66,9 +69,10 @@ pub enum NoNatural {
     Unsolvable,
 }
 
-/// Finds the natural boundary of `chart`, and a valid map inside it: by boundary first flattening, where it has no holes;
-/// else, or where that fails, by the spectral and the least squares conformal map of its vertices; else, for what is nearly a
-/// plane, by the projection. None of them scales areas by more than 100, or `max_area_ratio` where that is less.
+/// Finds the natural boundary of `chart`, and a valid map inside it: by boundary first flattening;
+/// where that fails, by the spectral and the least squares conformal map of its vertices; else, for what is nearly a
+/// plane, by the projection. None of them scales areas by more than `max_area_ratio`, and only the first
+/// by more than 100.
 ///
 /// # Errors
 /// [`Interrupted`].
@@ -115,10 +119,86 @@ pub fn natural_start(
     Ok(Err(why))
 }
 
+/// Finds a natural boundary of `chart` that is simple, and unfolds a map inside it, where [`natural_start`] found linear ones
+/// only that fold; none where there is none, or its areas are scaled too unevenly, as there.
+///
+/// # Errors
+/// [`Interrupted`].
+pub fn unfolded_start(
+    chart: &Chart,
+    max_area_ratio: f64,
+    monitor: &dyn Monitor,
+) -> Result<Option<NaturalStart>, Interrupted> {
+    let search = Search { chart, filled: FilledChart::open(chart), most: max_area_ratio, monitor };
+    for candidate in Candidate::ALL {
+        Checkpoint::new(monitor).end()?;
+        if let Some(start) = search.unfolded(candidate)? {
+            return Ok(Some(start));
+        }
+    }
+    Ok(None)
+}
+
+/// Frees the boundary of `chart` from the disk: the map nearest to an isometry that is found from `on_disk`, the uv of its
+/// vertices in a one-to-one map by straight triangles; none where there is none that scales areas as evenly as
+/// [`natural_start`] asks for.
+///
+/// # Errors
+/// [`Interrupted`].
+///
+/// # Example
+///
+/// A ramp of two turns would cover itself when it is laid out flat. Its boundary is freed from the disk, and it is bent open.
+///
+/// ```
+/// use planish_core::map::boundary::{Boundary, Mids};
+/// use planish_core::map::filled::FilledChart;
+/// use planish_core::map::linear::linear_map;
+/// use planish_core::map::natural::{NoNatural, freed_start, natural_start};
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{decompose, repair, shapes};
+///
+/// let mesh = repair(&shapes::ramp(24, 48), &Default::default())?.mesh;
+/// let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()])?;
+/// let chart = &atlas.charts()[0];
+/// assert_eq!(natural_start(chart, 1e6, &NoMonitor)?.err(), Some(NoNatural::Crossing));
+/// let filled = FilledChart::new(chart);
+/// let on_disk = linear_map(&filled, &Boundary::circle(&filled, Mids::Chord), &NoMonitor)?;
+/// let freed = freed_start(chart, on_disk.uv(), 1e6, &NoMonitor)?.expect("one-to-one");
+/// assert!(freed.conformal_p99 < 10.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn freed_start(
+    chart: &Chart,
+    on_disk: &[GridPoint],
+    max_area_ratio: f64,
+    monitor: &dyn Monitor,
+) -> Result<Option<NaturalStart>, Interrupted> {
+    let uv = on_disk[..chart.vertices().len()].iter().map(|p| p.uv()).collect();
+    let Some(uv) = solved(freed(chart, uv, monitor))? else { return Ok(None) };
+    let Some(Places::All(uv, _)) = Places::All(uv, Method::Isometric).fitted(chart) else { return Ok(None) };
+    let search = Search { chart, filled: FilledChart::open(chart), most: max_area_ratio, monitor };
+    let vertices: Vec<GridPoint> = uv.into_iter().map(GridPoint::vertex).collect();
+    let boundary = Boundary::chords(&search.filled, |v| vertices[v.index()]);
+    match LinearMap::through(&search.filled, vertices, Method::Isometric) {
+        Ok(linear) => Ok(search.proven(boundary, linear, false)?.ok()),
+        Err(_) => Ok(None),
+    }
+}
+
+/// What a system gives; none where it cannot be solved.
+fn solved<T>(found: Result<Option<T>, sparse::Error>) -> Result<Option<T>, Interrupted> {
+    match found {
+        Ok(found) => Ok(found),
+        Err(sparse::Error::Interrupted(interrupted)) => Err(interrupted),
+        Err(sparse::Error::Unsolvable(_)) => Ok(None),
+    }
+}
+
 /// Where a boundary may come from, in the order in which they are tried.
 #[derive(Clone, Copy)]
 enum Candidate {
-    /// Boundary first flattening: for charts without holes.
+    /// Boundary first flattening.
     BoundaryFirst,
     /// The spectral conformal map of the vertices.
     Spectral,
@@ -154,6 +234,14 @@ struct Search<'a> {
 
 impl Search<'_> {
     fn by(&self, candidate: Candidate) -> Result<Found, Interrupted> {
+        match self.places(candidate)? {
+            Ok(places) => self.within(places),
+            Err(why) => Ok(Err(why)),
+        }
+    }
+
+    /// Where a candidate has the boundary, or all vertices: turned, moved and scaled so that they fit.
+    fn places(&self, candidate: Candidate) -> Result<Result<Places, Option<NoNatural>>, Interrupted> {
         let Self { chart, filled, monitor, .. } = self;
         let places = match candidate {
             Candidate::BoundaryFirst => match boundary_first(chart, filled, *monitor) {
@@ -172,7 +260,12 @@ impl Search<'_> {
             Candidate::Projection => Ok(projected(chart, STEEP).map(|uv| Places::All(uv, Method::Projection))),
         };
         match places {
-            Ok(Some(places)) => self.within(places),
+            Ok(Some(places)) => {
+                let checkpoint = Checkpoint::new(*monitor);
+                let fitted = places.fitted(chart);
+                checkpoint.end()?;
+                Ok(fitted.ok_or(Some(NoNatural::Unsolvable)))
+            }
             Ok(None) => Ok(Err(None)),
             Err(sparse::Error::Interrupted(interrupted)) => Err(interrupted),
             Err(sparse::Error::Unsolvable(_)) => Ok(Err(Some(NoNatural::Unsolvable))),
@@ -181,19 +274,11 @@ impl Search<'_> {
 
     /// The start with the boundary at these places.
     fn within(&self, places: Places) -> Result<Found, Interrupted> {
-        let Self { chart, filled, most, monitor } = self;
-        let refused = |why: NoNatural| Ok(Err(Some(why)));
-        let checkpoint = Checkpoint::new(*monitor);
+        let Self { chart, filled, monitor, .. } = self;
         let is_flattened = matches!(places, Places::Boundary(_));
-        let Some(places) = places.fitted(chart) else { return refused(NoNatural::Unsolvable) };
-        checkpoint.end()?;
         let (boundary, linear) = match places {
-            Places::Boundary(corners) => {
-                let mut at = vec![GridPoint::default(); chart.vertices().len()];
-                for (h, uv) in chart.boundary().zip(corners.into_iter().flatten()) {
-                    at[chart.from(h).index()] = GridPoint::vertex(uv);
-                }
-                let boundary = Boundary::chords(filled, |v| at[v.index()]);
+            Places::Boundary(polygons) => {
+                let boundary = Boundary::chords(filled, on_loop(chart, polygons));
                 let linear = linear_map(filled, &boundary, *monitor);
                 (boundary, linear)
             }
@@ -207,12 +292,20 @@ impl Search<'_> {
                 (boundary, linear)
             }
         };
-        let linear = match linear {
-            Ok(linear) => linear,
-            Err(linear::Error::Interrupted(interrupted)) => return Err(interrupted),
-            Err(linear::Error::Folded { folded, .. }) => return refused(NoNatural::Folded { triangles: folded }),
-            Err(linear::Error::Solver(_)) => return refused(NoNatural::Unsolvable),
-        };
+        match linear {
+            Ok(linear) => self.proven(boundary, linear, is_flattened),
+            Err(linear::Error::Interrupted(interrupted)) => Err(interrupted),
+            Err(linear::Error::Folded { folded, .. }) => Ok(Err(Some(NoNatural::Folded { triangles: folded }))),
+            Err(linear::Error::Solver(_)) => Ok(Err(Some(NoNatural::Unsolvable))),
+        }
+    }
+
+    /// The start by a linear map, if it is one-to-one and scales areas evenly. Whether the boundary is flattened first decides
+    /// how evenly.
+    fn proven(&self, boundary: Boundary, linear: LinearMap, is_flattened: bool) -> Result<Found, Interrupted> {
+        let Self { chart, filled, most, monitor } = self;
+        let refused = |why: NoNatural| Ok(Err(Some(why)));
+        let checkpoint = Checkpoint::new(*monitor);
         checkpoint.end()?;
         let nodes = linear.degree_elevated(filled, &boundary);
         let cells = chart.cells().collect();
@@ -234,6 +327,43 @@ impl Search<'_> {
         let filled = filled.clone();
         Ok(Ok(NaturalStart { filled, boundary, linear, nodes, certified, conformal_p99 }))
     }
+
+    /// The start inside the boundary of a candidate, if that is simple, from a linear map that folds.
+    fn unfolded(&self, candidate: Candidate) -> Result<Option<NaturalStart>, Interrupted> {
+        let Self { chart, filled, monitor, .. } = self;
+        let Ok(places) = self.places(candidate)? else { return Ok(None) };
+        let is_flattened = matches!(places, Places::Boundary(_));
+        let boundary = match places {
+            Places::Boundary(polygons) => Boundary::chords(filled, on_loop(chart, polygons)),
+            Places::All(uv, _) => Boundary::chords(filled, |v| GridPoint::vertex(uv[v.index()])),
+        };
+        let mut uv = match harmonic_uv(filled, &boundary, *monitor) {
+            Ok(uv) => uv,
+            Err(linear::Error::Interrupted(interrupted)) => return Err(interrupted),
+            Err(_) => return Ok(None),
+        };
+        let points: Vec<[f64; 2]> = uv.iter().map(|p| p.uv()).collect();
+        if !Clearance::of(chart).is_kept(&points) {
+            return Ok(None);
+        }
+        let Some(found) = solved(unfolded(chart, points, *monitor))? else { return Ok(None) };
+        for v in filled.elimination() {
+            uv[v.index()] = GridPoint::vertex(found[v.index()]);
+        }
+        match LinearMap::through(filled, uv, Method::Unfolded) {
+            Ok(linear) => Ok(self.proven(boundary, linear, is_flattened)?.ok()),
+            Err(_) => Ok(None),
+        }
+    }
+}
+
+/// Per vertex of the loops of a chart its place, given in their order.
+fn on_loop(chart: &Chart, polygons: Vec<Polygon>) -> impl Fn(VertexId) -> GridPoint {
+    let mut at = vec![GridPoint::default(); chart.vertices().len()];
+    for (h, uv) in chart.boundary().zip(polygons.into_iter().flatten()) {
+        at[chart.from(h).index()] = GridPoint::vertex(uv);
+    }
+    move |v| at[v.index()]
 }
 
 /// Places in the plane.
