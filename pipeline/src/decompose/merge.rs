@@ -1,10 +1,10 @@
 //! Growing charts: starting from a few dozen compact regions, the best pair of neighbours is united again and
 //! again, as long as unions are legal and not too distorted.
 
+use super::BoundaryShape;
 use super::predict::{CellGraph, WORK_PER_CELL, predict};
 use super::regions::{Regions, Shape, Union};
 use crate::monitor::{Checkpoint, Interrupted};
-use crate::settings::BoundaryShape;
 use crate::vec3::norm;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

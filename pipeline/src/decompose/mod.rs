@@ -19,6 +19,7 @@
 //! sorting, but for a fixed number of cells; every loop has its reason to end beside it.
 
 mod assemble;
+mod boundary_shape;
 mod clearance;
 mod complex;
 mod dual;
@@ -45,9 +46,9 @@ mod voronoi;
 use crate::atlas::Atlas;
 use crate::mesh::SurfaceMesh;
 use crate::monitor::{Interrupted, Monitor};
-use crate::settings::BoundaryShape;
 use crate::topology::HalfEdgeId;
 pub use assemble::assemble;
+pub use boundary_shape::BoundaryShape;
 use complex::Complex;
 use dual::Dual;
 pub use ears::{WithoutEars, split_ears};

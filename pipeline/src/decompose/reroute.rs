@@ -180,13 +180,13 @@ impl Network<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decompose::BoundaryShape;
     use crate::decompose::dual::Dual;
     use crate::decompose::merge::Limits;
     use crate::decompose::patches::compact_cells;
     use crate::decompose::shortest::{Bounds, Goal, Tree};
     use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
-    use crate::settings::BoundaryShape;
     use crate::shapes::{self, Random};
 
     /// Compares a network with one that is made anew of its labels.

@@ -207,10 +207,10 @@ impl Bounds<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decompose::BoundaryShape;
     use crate::decompose::merge::Limits;
     use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
-    use crate::settings::BoundaryShape;
     use crate::shapes::{self, Random};
 
     #[test]

@@ -1,8 +1,8 @@
 //! The graph of cells: finite volumes, and the conductances between them.
 
+use super::super::BoundaryShape;
 use super::super::complex::{Complex, NONE};
 use super::super::voronoi::Graph;
-use crate::settings::BoundaryShape;
 use crate::topology::csr::Csr;
 use crate::vec3::{Vec3, distance};
 

@@ -9,10 +9,10 @@ mod disk;
 mod natural;
 mod runs;
 
+use super::BoundaryShape;
 use super::complex::{Complex, NONE};
 use crate::fem::dofs::Dofs;
 use crate::measure::quantiles::{Weighted, quantiles};
-use crate::settings::BoundaryShape;
 use crate::vec3::distance;
 pub(super) use cell_graph::CellGraph;
 use runs::{Run, runs};
