@@ -160,8 +160,7 @@ pub struct Making {
     /// Let holes of charts be holes of the surface only
     #[arg(long)]
     pub strict_disks: bool,
-    /// Split charts in which the area scale varies by more than a factor R [default: 3e3; with
-    /// --boundary circle 1e6]
+    /// Split charts in which the area scale varies by more than a factor R [default: 1e6]
     #[arg(long, value_name = "R")]
     pub max_area_ratio: Option<f64>,
     /// Let no chart have more than N triangles [default: any number]

@@ -36,7 +36,7 @@ fn a_plate_keeps_its_shape_by_default_and_is_mapped_to_the_disk_on_demand() {
     let (chart, argument) = only_chart(&report);
     assert_eq!((report.settings.boundary, chart.boundary.shape), (Some(Boundary::Natural), BoundaryShape::Natural));
     assert_eq!((argument, chart.certificate.boundary.holes, chart.loops), ("simple", 3, 4));
-    assert_eq!((chart.linear.method.as_str(), &chart.boundary.reason), ("conformal", &None));
+    assert_eq!((chart.linear.method.as_str(), &chart.boundary.reason), ("harmonic", &None));
     is_proven_again(&out, name);
 
     // Another boundary is another result.

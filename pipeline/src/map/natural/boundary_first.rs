@@ -241,4 +241,36 @@ mod tests {
             assert!((distance(*p, centre) / chart.scale() - 1.0).abs() < 0.01, "{p:?}");
         }
     }
+
+    #[test]
+    fn holes_of_a_flat_plate_stay_where_they_are_and_what_is_rolled_up_is_unrolled() {
+        let plate = shapes::disk_with_holes(13, 2);
+        let moved = |to: &dyn Fn([f64; 3]) -> [f64; 3]| {
+            let points = plate.points().iter().map(|p| to(*p)).collect();
+            crate::mesh::TriangleSoup::new(points, plate.triangles().to_vec()).expect("sound")
+        };
+        let soups =
+            [moved(&|[x, y, _]| [x, y, 0.0]), moved(&|[x, y, _]| [0.5 * (2.0 * x).sin(), y, 0.5 * (2.0 * x).cos()])];
+        let [flat, rolled] = soups.map(|soup| {
+            let mesh = repair(&soup, &Default::default()).expect("a surface").mesh;
+            let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk");
+            let chart = atlas.into_charts().remove(0);
+            let flat =
+                boundary_first(&chart, &FilledChart::open(&chart), &NoMonitor).expect("solves").expect("few holes");
+            let at: Vec<[f64; 2]> =
+                flat.loops.expect("closes").concat().iter().map(|p| p.map(|c| c / chart.scale())).collect();
+            let points: Vec<_> = chart.boundary().map(|h| chart.points()[chart.from(h).index()]).collect();
+            (at, points, flat.area_ratio)
+        });
+        assert!(flat.2 < 1.0 + 1e-9 && rolled.2 < 1.02, "{} {}", flat.2, rolled.2);
+        for i in 0..flat.0.len() {
+            for j in 0..i {
+                let [p, q] = [i, j].map(|k| [flat.1[k][0], flat.1[k][1]]);
+                let wanted = distance(p, q);
+                assert!((distance(flat.0[i], flat.0[j]) - wanted).abs() < 1e-9, "{i} {j}");
+                // Chords of an arc of two radians are shorter than it.
+                assert!((distance(rolled.0[i], rolled.0[j]) - wanted).abs() < 0.03 * wanted.max(0.3), "{i} {j}");
+            }
+        }
+    }
 }
