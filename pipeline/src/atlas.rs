@@ -108,9 +108,14 @@ impl Chart {
         &self.holes
     }
 
-    /// The half-edges of all loops: those of the outer one, then those around holes.
+    /// All loops: the outer one, then those around holes.
+    pub fn loops(&self) -> impl Iterator<Item = &[HalfEdgeId]> {
+        std::iter::once(&self.outer).chain(&self.holes).map(Vec::as_slice)
+    }
+
+    /// The half-edges of all loops, in that order.
     pub fn boundary(&self) -> impl Iterator<Item = HalfEdgeId> {
-        self.outer.iter().chain(self.holes.iter().flatten()).copied()
+        self.loops().flatten().copied()
     }
 
     /// The vertex at which `h` begins.

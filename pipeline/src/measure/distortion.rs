@@ -7,7 +7,7 @@ use crate::certify::{CertifiedMap, PlanarMap};
 use crate::fem::bernstein::{self, JacobianBezier};
 use crate::fem::element::{Barycentric, Element, P2, P2Nodes};
 use crate::grid::GridPoint;
-use crate::measure::quantiles::{Weighted, quantiles};
+use crate::measure::quantiles::{Weighted, extreme_ratio, quantiles};
 use crate::topology::{Stars, VertexId, VisitStamps};
 
 /// The fields of one triangle.
@@ -241,8 +241,7 @@ pub(crate) fn area_ratio_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [GridP
 
 /// The 99.9 % over the 0.1 % quantile, by area.
 fn ratio(mut scales: Vec<Weighted>) -> f64 {
-    let [low, high] = quantiles(&mut scales, [0.001, 0.999]);
-    finite(high / low)
+    finite(extreme_ratio(&mut scales))
 }
 
 /// Per triangle of a map its area in the plane.

@@ -15,6 +15,12 @@ pub(crate) fn quantiles<const N: usize>(weighted: &mut [Weighted], shares: [f64;
     shares.map(|share| value_at(weighted, share * total))
 }
 
+/// The 99.9 % over the 0.1 % quantile: how unevenly a map scales areas. Infinite where the latter is not positive.
+pub(crate) fn extreme_ratio(scales: &mut [Weighted]) -> f64 {
+    let [low, high] = quantiles(scales, [0.001, 0.999]);
+    if low > 0.0 { high / low } else { f64::INFINITY }
+}
+
 /// The value at which `weight` is passed.
 fn value_at(sorted: &[Weighted], weight: f64) -> f64 {
     let mut left = weight;

@@ -89,9 +89,7 @@ impl Maps {
             Some(Err(_)) | None => of_start,
         }
     }
-}
 
-impl Maps {
     /// The share of the chart's triangles that are invalid in its harmonic map; 0 where there is none.
     pub(super) fn invalid_share(&self, chart: &Chart) -> f64 {
         let invalid = match &self.harmonic {

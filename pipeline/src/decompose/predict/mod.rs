@@ -12,9 +12,10 @@ mod runs;
 use super::BoundaryShape;
 use super::complex::{Complex, NONE};
 use crate::fem::dofs::Dofs;
-use crate::measure::quantiles::{Weighted, quantiles};
+use crate::measure::quantiles::{Weighted, extreme_ratio};
 use crate::vec3::distance;
 pub(super) use cell_graph::CellGraph;
+use natural::NaturalMap;
 use runs::{Run, runs};
 
 /// The work of predicting a ratio, per cell: as long as so many triangles are looked at.
@@ -23,9 +24,6 @@ pub(super) const WORK_PER_CELL: usize = 20;
 /// Loops shorter than this share of the longest are never the outer one. Each that may be costs a map. By experience: as a
 /// rule the map is stretched more where a small hole is blown up to the circle.
 const LONG: f64 = 0.5;
-
-/// The share of the area that is left out at either end: as in the area ratio of a map, which is what is predicted.
-const QUANTILE: f64 = 0.001;
 
 /// What a map of some cells would be like.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,26 +49,17 @@ pub(super) fn predict(complex: &Complex, graph: &CellGraph, cells: &[u32], loops
     cells.sort_unstable_by_key(|c| graph.rank(*c));
     let dofs = Dofs::new(graph.cells(), cells);
     let union = CellUnion::new(complex, graph, &dofs, loops, lengths);
-    let nowhere = PredictedMap { area_ratio: f64::INFINITY, outer: first };
+    // Of loops that are as good, the first one is taken.
     if graph.boundary() == BoundaryShape::Natural {
-        let best = least(&long, nowhere, |outer| natural::area_ratio(&union, outer));
-        if natural::lies_flat(&union, best.outer) {
-            return best;
+        let maps = long.iter().filter_map(|outer| NaturalMap::new(&union, *outer));
+        let best = maps.min_by(|a, b| a.area_ratio.total_cmp(&b.area_ratio));
+        if let Some(best) = best.filter(|map| map.lies_flat(&union)) {
+            return best.predicted();
         }
     }
-    least(&long, nowhere, |outer| disk::area_ratio(&union, outer))
-}
-
-/// The least of these ratios; of loops that are as good, the first one.
-fn least(long: &[usize], nowhere: PredictedMap, area_ratio: impl Fn(usize) -> f64) -> PredictedMap {
-    let mut best = nowhere;
-    for outer in long {
-        let area_ratio = area_ratio(*outer);
-        if area_ratio.total_cmp(&best.area_ratio).is_lt() {
-            best = PredictedMap { area_ratio, outer: *outer };
-        }
-    }
-    best
+    let on_disk = |outer: &usize| PredictedMap { area_ratio: disk::area_ratio(&union, *outer), outer: *outer };
+    let best = long.iter().map(on_disk).min_by(|a, b| a.area_ratio.total_cmp(&b.area_ratio));
+    best.unwrap_or(PredictedMap { area_ratio: f64::INFINITY, outer: first })
 }
 
 /// Some cells, their loops, and what all systems have in common.
@@ -137,7 +126,6 @@ impl<'a> CellUnion<'a> {
             Weighted { value: scale(i, area), weight: area }
         };
         let mut scales: Vec<Weighted> = self.dofs.free().iter().enumerate().map(weighted).collect();
-        let [low, high] = quantiles(&mut scales, [QUANTILE, 1.0 - QUANTILE]);
-        if low > 0.0 { (high / low).max(1.0) } else { f64::INFINITY }
+        extreme_ratio(&mut scales).max(1.0)
     }
 }

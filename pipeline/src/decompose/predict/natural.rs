@@ -9,19 +9,33 @@
 //! By how much the outer loop turns in the plane at each of its cells tells its shape there, and whether the map covers itself.
 
 use super::super::graph_laplacian::GraphLaplacian;
-use super::CellUnion;
+use super::{CellUnion, PredictedMap};
 use std::f64::consts::{PI, TAU};
 
-/// The area ratio of the map that keeps the lengths of this loop: infinite where there is none in doubles.
-pub(super) fn area_ratio(union: &CellUnion, outer: usize) -> f64 {
-    log_scales(union, outer).map_or(f64::INFINITY, |a| union.ratio(|i, _| (2.0 * a[i]).exp()))
+/// The map that keeps the lengths of a loop.
+pub(super) struct NaturalMap {
+    outer: usize,
+    /// Per cell, the logarithm of the scale of lengths.
+    log_scales: Vec<f64>,
+    pub area_ratio: f64,
 }
 
-/// Whether that map hardly covers itself.
-pub(super) fn lies_flat(union: &CellUnion, outer: usize) -> bool {
-    let Some(scales) = log_scales(union, outer) else { return false };
-    let outline = laid_out(union, outer, &scales);
-    overlap(&outline) <= OVERLAP
+impl NaturalMap {
+    /// None where there is none in doubles.
+    pub fn new(union: &CellUnion, outer: usize) -> Option<Self> {
+        let log_scales = log_scales(union, outer)?;
+        let area_ratio = union.ratio(|i, _| (2.0 * log_scales[i]).exp());
+        Some(Self { outer, log_scales, area_ratio })
+    }
+
+    /// Whether it hardly covers itself.
+    pub fn lies_flat(&self, union: &CellUnion) -> bool {
+        overlap(&laid_out(union, self.outer, &self.log_scales)) <= OVERLAP
+    }
+
+    pub fn predicted(&self) -> PredictedMap {
+        PredictedMap { area_ratio: self.area_ratio, outer: self.outer }
+    }
 }
 
 /// Per cell, the logarithm of the scale of lengths.

@@ -15,7 +15,7 @@ use super::placement::placed;
 use crate::atlas::Chart;
 use crate::fem::sparse;
 use crate::map::filled::FilledChart;
-use crate::measure::quantiles::{Weighted, quantiles};
+use crate::measure::quantiles::{Weighted, extreme_ratio};
 use crate::monitor::{Checkpoint, Monitor};
 use crate::topology::HalfEdgeId;
 use std::f64::consts::{PI, TAU};
@@ -33,9 +33,6 @@ pub(super) struct Flattened {
 
 /// Charts with more holes are not laid out: each takes three solutions.
 const MOST_HOLES: usize = 100;
-
-/// The share of the area that is left out at either end: as in the area ratio of a map.
-const QUANTILE: f64 = 0.001;
 
 /// Lays `chart` out; none where it has too many holes.
 ///
@@ -65,11 +62,6 @@ pub(super) fn boundary_first(
     drop(factor);
     checkpoint.end()?;
     Ok(flat.map(|flat| Flattened { loops: placed, area_ratio: flat.area_ratio(chart) }))
-}
-
-/// The loops of a chart: the outer one, then those of the holes.
-pub(super) fn loops(chart: &Chart) -> impl Iterator<Item = &[HalfEdgeId]> {
-    std::iter::once(chart.outer()).chain(chart.holes().iter().map(|hole| &hole[..]))
 }
 
 /// The metric of the plane on a chart.
@@ -129,13 +121,12 @@ impl FlatMetric {
         let weighted = chart.triangles().iter().zip(chart.shapes());
         let mut scales: Vec<Weighted> =
             weighted.map(|(t, shape)| Weighted { value: scale(t), weight: shape.area() }).collect();
-        let [low, high] = quantiles(&mut scales, [QUANTILE, 1.0 - QUANTILE]);
-        if low > 0.0 { high / low } else { f64::INFINITY }
+        extreme_ratio(&mut scales)
     }
 
     /// The loops, each in a place of its own.
     fn polygons(&self, chart: &Chart) -> Option<Vec<Polygon>> {
-        loops(chart).map(|boundary_loop| self.polygon(chart, boundary_loop)).collect()
+        chart.loops().map(|boundary_loop| self.polygon(chart, boundary_loop)).collect()
     }
 
     fn polygon(&self, chart: &Chart, boundary_loop: &[HalfEdgeId]) -> Option<Polygon> {

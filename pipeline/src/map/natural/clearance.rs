@@ -17,6 +17,7 @@ use crate::atlas::Chart;
 use crate::certify::polygons;
 use crate::evaluate::Bvh;
 use crate::grid::GridPoint;
+use crate::topology::HalfEdgeId;
 use crate::vec3::{BoundingBox, Vec3, norm};
 
 /// How far the barrier reaches, as a share of the mean side. A quarter, as in the paper.
@@ -61,9 +62,8 @@ struct Foot<const N: usize> {
 
 impl Clearance {
     pub fn of(chart: &Chart) -> Self {
-        let order = |l: &Vec<crate::topology::HalfEdgeId>| l.iter().map(|h| chart.from(*h).index()).collect();
-        let loops: Vec<Vec<usize>> =
-            std::iter::once(chart.outer().to_vec()).chain(chart.holes().iter().cloned()).map(|l| order(&l)).collect();
+        let order = |l: &[HalfEdgeId]| l.iter().map(|h| chart.from(*h).index()).collect();
+        let loops: Vec<Vec<usize>> = chart.loops().map(order).collect();
         let sides_of =
             |l: &Vec<usize>| -> Vec<[usize; 2]> { (0..l.len()).map(|i| [l[i], l[(i + 1) % l.len()]]).collect() };
         let sides: Vec<[usize; 2]> = loops.iter().flat_map(sides_of).collect();

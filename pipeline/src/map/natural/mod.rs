@@ -33,7 +33,7 @@ use crate::certify::{PlanarMap, StraightMap, parts, prove_straight};
 use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::measure::distortion::{Summary, singular_ratio};
-use crate::measure::quantiles::{Weighted, quantiles};
+use crate::measure::quantiles::{Weighted, extreme_ratio, quantiles};
 use crate::monitor::{Interrupted, Monitor};
 pub use conformal::{conformal, conformal_by_corners, spectral_conformal};
 pub use projection::projection;
@@ -187,8 +187,7 @@ fn summary(chart: &Chart, map: &PlanarMap) -> Summary {
         }
     }
     let [conformal_median, conformal_p99] = quantiles(&mut conformal, [0.5, 0.99]);
-    let [min, max] = quantiles(&mut scales, [0.001, 0.999]);
-    Summary { conformal_median, conformal_p99, area_ratio: (max / min).clamp(1.0, f64::MAX) }
+    Summary { conformal_median, conformal_p99, area_ratio: extreme_ratio(&mut scales).clamp(1.0, f64::MAX) }
 }
 
 fn middle(p: [f64; 2], q: [f64; 2]) -> [f64; 2] {

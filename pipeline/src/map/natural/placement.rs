@@ -10,7 +10,7 @@
 //! a_k turns and scales the hole, b_k moves it. The area is that of the outer polygon less |a_k|^2 times those of the p_k. So
 //! there are two complex equations for each hole.
 
-use super::boundary_first::{Polygon, loops};
+use super::boundary_first::Polygon;
 use super::dense;
 use super::laplace::Laplacian;
 use crate::atlas::Chart;
@@ -52,7 +52,7 @@ pub(super) fn placed(
         functions.push(extended(hole, &|_| [1.0, 0.0]));
     }
     // Functions are harmonic inside: their products are those along the boundary.
-    let boundary: Vec<usize> = loops(chart).flatten().map(|h| chart.from(*h).index()).collect();
+    let boundary: Vec<usize> = chart.boundary().map(|h| chart.from(h).index()).collect();
     let count = functions.len();
     let mut equations = vec![vec![0.0; 2 * count + 1]; 2 * count];
     for (m, row) in functions.iter().enumerate() {
