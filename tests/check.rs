@@ -257,6 +257,30 @@ fn param_must_show_the_same_map() {
     assert!(ended.code == Some(1) && ended.err.contains("param.vtu"), "{}", ended.err);
 }
 
+/// A chart that param.vtu shows in another size, as the report says.
+#[test]
+fn a_chart_in_another_size_than_its_own_is_found() {
+    let name = "disk.stl";
+    for factor in [4.0, 0.25, 1.5] {
+        let out = certified(name);
+        let mut report = out.report(name);
+        report.charts[0].uv_scale *= factor;
+        let (scale, shift) = (report.charts[0].uv_scale, report.charts[0].shift);
+        std::fs::write(out.of(name).join("report.json"), report.to_json().expect("JSON")).expect("written");
+        rewrite(&out, name, "param.vtu", |piece| {
+            let uv = doubles(&mut piece.data.point, "uv").clone();
+            let IOBuffer::F64(points) = &mut piece.points else { panic!("doubles") };
+            let components = 3 * uv.len() / points.len();
+            for (point, uv) in points.chunks_exact_mut(3).zip(uv.chunks_exact(components)) {
+                (point[0], point[1]) = (uv[0] * scale + shift[0], uv[1] * scale + shift[1]);
+            }
+        });
+        forge_checksums(&out, name);
+        let ended = check(&out, name);
+        assert!(ended.code == Some(1) && ended.err.contains("uv_scale"), "{factor}: {}", ended.err);
+    }
+}
+
 #[test]
 fn any_changed_byte_is_found_with_the_name_of_its_file() {
     let name = "floater_five.obj";

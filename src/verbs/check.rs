@@ -18,6 +18,7 @@ use crate::stages::guard;
 use planish_core::certify::{self, PlanarMap, prove};
 use planish_core::grid::GridPoint;
 use planish_core::measure::distortion::CellFields;
+use planish_core::mesh::TriangleShape;
 use std::path::{Path, PathBuf};
 
 /// The files that every certified result has.
@@ -117,6 +118,8 @@ fn check_one(folder: &Path) -> Findings {
                     Err(finding) => found.wrong.push(finding),
                 }
             }
+            let mollified_by = report.repairs.as_ref().map_or(0.0, |r| r.mollified_by);
+            found.wrong.extend(check_scales(&grid, &report.charts, mollified_by));
             found.wrong.extend(check_param(folder, &grid, &report.charts).err());
         }
         Err(finding) => found.wrong.push(finding),
@@ -302,6 +305,58 @@ fn unproven(grid: &Grid, cells: &[usize], chart: u32, error: certify::Error) -> 
             Finding::Triangles { chart, triangles }
         }
         other => Finding::Chart { chart, problem: other.to_string() },
+    }
+}
+
+/// How far the area of a chart in param.vtu may be from that in space: `uv_scale` is the nearest power of two, and areas that
+/// are summed in another order differ in their last places.
+const OFF_BY: f64 = 2.02;
+
+/// Every `uv_scale` must be the power of two that gives its chart its own size.
+fn check_scales(grid: &Grid, charts: &[ChartReport], mollified_by: f64) -> Vec<Finding> {
+    // A power of two in which squares of lengths neither vanish nor overflow.
+    let largest = grid.points.iter().flatten().fold(f64::MIN_POSITIVE, |most, c| most.max(c.abs()));
+    let unit = largest.log2().floor().exp2();
+    let mut sizes = vec![Sizes::default(); charts.len()];
+    for (cell, chart) in grid.cells.iter().zip(&grid.chart) {
+        if let Some(sizes) = usize::try_from(*chart).ok().and_then(|c| sizes.get_mut(c)) {
+            sizes.add(cell, grid, unit, mollified_by / unit);
+        }
+    }
+    let mut found = Vec::new();
+    for (chart, sizes) in charts.iter().zip(sizes) {
+        if !sizes.allow(chart.uv_scale / unit) {
+            let scale = chart.uv_scale;
+            let problem = format!("uv_scale {scale:e} is not the power of two that gives it the size it has in space");
+            found.push(Finding::Chart { chart: chart.id, problem });
+        }
+    }
+    found
+}
+
+/// Areas of a chart.
+#[derive(Clone, Default)]
+struct Sizes {
+    in_plane: f64,
+    in_space: f64,
+    /// By edges that are longer by what was added to all of the surface.
+    mollified: f64,
+}
+
+impl Sizes {
+    fn add(&mut self, cell: &[u32; 6], grid: &Grid, unit: f64, added: f64) {
+        let corners = [cell[0], cell[1], cell[2]].map(|n| n as usize);
+        let [a, b, c] = corners.map(|n| grid.uv[n]);
+        self.in_plane += 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+        let shape = TriangleShape::of(corners.map(|n| grid.points[n].map(|x| x / unit)));
+        self.in_space += shape.area();
+        self.mollified += TriangleShape { lengths: shape.lengths.map(|l| l + added) }.area();
+    }
+
+    fn allow(&self, scale: f64) -> bool {
+        let area = self.in_plane * scale * scale;
+        let is_power_of_two = scale.is_normal() && scale.log2().floor().exp2() == scale;
+        is_power_of_two && self.in_space / OFF_BY <= area && area <= self.mollified * OFF_BY
     }
 }
 

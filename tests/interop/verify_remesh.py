@@ -93,8 +93,9 @@ def inner_nodes(cells):
     return inner[:: max(1, len(inner) // 300)]
 
 
-def verify_atlas(folder, linear_charts, natural_charts, diagonal):
-    """Gmsh reads the triangles of the input from atlas.msh, and its maps are those of surface.vtu."""
+def verify_atlas(folder, scales, linear_charts, natural_charts, diagonal):
+    """Gmsh reads the triangles of the input from atlas.msh, and its maps are those of surface.vtu times the `uv_scale` of each
+    chart, exactly."""
     grid = read_grid(os.path.join(folder, "surface.vtu"))
     places, uv = vtk_to_numpy(grid.GetPoints().GetData()), vtk_to_numpy(grid.GetPointData().GetArray("uv"))
     cells = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 6)
@@ -114,7 +115,7 @@ def verify_atlas(folder, linear_charts, natural_charts, diagonal):
             if chart in natural_charts:
                 there = gmsh.model.getParametrization(2, tag, places[nodes].ravel())
             else:
-                there = uv[nodes].ravel()
+                there = (uv[nodes] * scales[chart]).ravel()
             x = numpy.array(gmsh.model.getValue(2, tag, there)).reshape(-1, 3)
             off = numpy.abs(x - places[nodes]).max() / diagonal
             assert off < TOLERANCE, f"chart {chart}: Gmsh's map is off by {off:.1e} of the diagonal"
@@ -253,7 +254,8 @@ def verify(folder, seconds, sizes, keep):
     report = json.load(open(os.path.join(folder, "report.json"), encoding="utf-8"))
     surface, faces, charts = read_surface(os.path.join(folder, "surface.vtu"))
     diagonal = numpy.linalg.norm(surface.max(0) - surface.min(0))
-    verify_atlas(folder, report["hand_off"]["linear_charts"], report["hand_off"]["natural_charts"], diagonal)
+    scales = [chart["uv_scale"] for chart in report["charts"]]
+    verify_atlas(folder, scales, report["hand_off"]["linear_charts"], report["hand_off"]["natural_charts"], diagonal)
     points, triangles, surfaces, lines, said = remesh(folder, seconds, keep)
     assert sorted(set(surfaces)) == sorted(set(charts)), "every chart has triangles"
     assert len(numpy.unique(numpy.sort(triangles, 1), axis=0)) == len(triangles), "two triangles on the same nodes"

@@ -3,4 +3,5 @@
 pub mod curvature;
 pub mod distortion;
 pub(crate) mod quantiles;
+pub mod scale;
 pub mod spikes;

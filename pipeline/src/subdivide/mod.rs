@@ -27,6 +27,7 @@ use crate::certified::CertifiedAtlas;
 use crate::certify::{BoundaryArgument, CertifiedMap, PlanarMap, StraightMap, parts, polygons, prove};
 use crate::grid::{GridPoint, orientation};
 use crate::measure::curvature::Principal;
+use crate::measure::scale::uv_scale;
 use crate::mesh::SurfaceMesh;
 use crate::seams::{Curve, Passage, SeamNetwork};
 use crate::topology::{ChartId, CurveId, FaceId, VertexId};
@@ -63,6 +64,8 @@ pub struct LinearChart {
     triangles: Vec<[u32; 3]>,
     /// Per triangle, the curved triangle of the chart that it is a part of.
     faces: Vec<u32>,
+    /// A power of two.
+    uv_scale: f64,
 }
 
 /// Why charts cannot be handed over as linear triangulations.
@@ -174,6 +177,12 @@ impl LinearChart {
     /// Per node of the chart, its uv.
     pub fn uv(&self) -> &[GridPoint] {
         &self.uv
+    }
+
+    /// By how much the plane must grow for the chart to have its own size there: the [`uv_scale`] of the map by which it is
+    /// handed over.
+    pub fn uv_scale(&self) -> f64 {
+        self.uv_scale
     }
 
     /// Per triangle, the triangle of the certified chart that it is a part of.
@@ -490,6 +499,7 @@ fn quartered(mesh: &SurfaceMesh, chart: &Chart, map: &PlanarMap, nodes: &Nodes) 
         uv: map.nodes.clone(),
         triangles: map.cells.iter().flat_map(|c| parts(*c)).collect(),
         faces: (0..map.cells.len() as u32).flat_map(|f| [f; 4]).collect(),
+        uv_scale: uv_scale(chart, map),
     }
 }
 

@@ -21,7 +21,7 @@ use planish_core::vec3::BoundingBox;
 ///
 /// `$Entities` holds the boundary representation: a point for every end of a curve, its curves, a
 /// surface per chart. `$Parametrizations` holds the curves as polylines and the charts as triangulations in space
-/// and in the plane; see docs/gmsh.md for what Gmsh asks of it. Tags are positions plus one.
+/// and in the plane, there in their own size ([`LinearChart::uv_scale`]); see docs/gmsh.md for what Gmsh asks of it. Tags are positions plus one.
 pub fn atlas(atlas: &CertifiedAtlas, linear: &LinearAtlas) -> Vec<u8> {
     let network = atlas.seams();
     let mut out = Binary::new();
@@ -106,10 +106,12 @@ fn parametrizations(out: &mut Binary, linear: &LinearAtlas) {
 fn surface(out: &mut Binary, linear: &LinearAtlas, chart: &LinearChart) {
     out.size(chart.nodes().len());
     out.size(chart.triangles().len());
+    // Powers of two: nothing is rounded.
+    let scale = chart.uv_scale() * out.unit;
     for (node, uv) in chart.nodes().iter().zip(chart.uv()) {
         let [largest, smallest] = linear.curvatures()[*node as usize];
         out.point(linear.points()[*node as usize]);
-        out.doubles(&uv.uv());
+        out.doubles(&uv.uv().map(|c| c * scale));
         out.curvature(largest);
         out.curvature(smallest);
     }

@@ -1,12 +1,12 @@
 //! Where charts lie in param.vtu: beside each other, each in its own size.
 
 use planish_core::CertifiedChart;
+use planish_core::measure::scale::uv_scale;
 
 /// The place of a chart: its uv, times `scale`, moved by `shift`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// The power of two with which the chart has, within a factor of two, the area that it has in space. The uv of natural
-    /// maps are made so that it has that area exactly, up to rounding.
+    /// The power of two with which the chart has its own size ([`uv_scale`]).
     pub scale: f64,
     /// In the unit of the input.
     pub shift: [f64; 2],
@@ -60,7 +60,7 @@ struct ScaledBox {
 
 impl ScaledBox {
     fn of(certified: &CertifiedChart) -> Self {
-        let scale = uv_scale(certified);
+        let scale = uv_scale(certified.chart(), certified.map().map());
         let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for p in certified.map().map().nodes.iter().map(|n| n.uv()) {
             for k in 0..2 {
@@ -74,20 +74,6 @@ impl ScaledBox {
     fn area(&self) -> f64 {
         self.size[0] * self.size[1]
     }
-}
-
-/// The power of two next to the root of a chart's area in space over that in the plane.
-fn uv_scale(certified: &CertifiedChart) -> f64 {
-    let chart = certified.chart();
-    let in_space: f64 = (0..chart.triangles().len()).map(|f| chart.area(f)).sum();
-    let map = certified.map().map();
-    let doubled = |cell: &[u32; 6]| {
-        let [a, b, c] = [0, 1, 2].map(|k| map.nodes[cell[k] as usize].uv());
-        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    };
-    let in_plane = 0.5 * map.cells.iter().map(doubled).sum::<f64>();
-    // Finite for any surface: sizes beyond doubles were refused.
-    (0.5 * (in_space / in_plane).log2()).round().clamp(-1000.0, 1000.0).exp2()
 }
 
 #[cfg(test)]
