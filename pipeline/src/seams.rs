@@ -12,9 +12,12 @@
 //! charts does. The cost is that of sorting the segments.
 
 mod distance;
+mod gaps;
 mod kinks;
 
 pub(crate) use distance::segment_distance;
+
+pub use gaps::Gap;
 
 use crate::atlas::Chart;
 use crate::mesh::SurfaceMesh;

@@ -1,22 +1,20 @@
 //! The hand-off to Gmsh: `atlas.msh` and `remesh.geo`, with the edge length that the script asks for.
 
+use super::narrow::{Places, places};
 use crate::formats::gmsh;
 use crate::report::ExportReport;
 use crate::result_files;
 use planish_core::atlas::Chart;
 use planish_core::certified::BoundaryFound;
-use planish_core::certified::NARROW;
 use planish_core::evaluate::Plane;
 use planish_core::map::natural::{Natural, natural};
 use planish_core::measure::distortion::Summary;
 use planish_core::measure::spikes::spikes;
 use planish_core::monitor::{Interrupted, Monitor};
-use planish_core::seams::{Curve, Passage, SeamNetwork};
 use planish_core::subdivide::{self, LinearAtlas, subdivide};
 use planish_core::topology::{ChartId, FaceId};
 use planish_core::vec3::unit_scale;
 use planish_core::{CertifiedAtlas, CertifiedChart};
-use std::collections::BTreeMap;
 
 /// Maps whose conformal distortion exceeds this on a hundredth of their area are left to MeshAdapt: the other algorithms
 /// of Gmsh measure lengths by the map at one point, and miss whole parts of a surface where that changes from triangle to
@@ -38,26 +36,6 @@ const QUICK: f64 = 4_500.0;
 
 /// The largest area ratio of such a chart: MeshAdapt cuts off what a map shrinks (gebco_seabed, at 5e4).
 const EVEN: f64 = 100.0;
-
-/// Every loop of a chart gets at least so many edges: an octagon has 0.90 of the area of its circle, a hexagon 0.83.
-const EDGES_PER_LOOP: f64 = 8.0;
-
-/// A chart is so many elements wide at least, unless it is as wide as an edge is long. By experience: more makes
-/// many elements in strips that one row would fill.
-const ELEMENTS_ACROSS: f64 = 1.5;
-
-/// The same for charts that share two curves without a common end, as the two sides of a thin strip do: an edge across such a
-/// chart, from curve to curve, may be one of the other chart, too (two of truck_nonmanifold).
-const ACROSS_SHEETS: f64 = 3.0;
-
-/// Charts of less than so many squares of the size get elements small enough for their whole boundary, inside, too, and half
-/// of the size where MeshAdapt makes them: it measures edges at their middles, and cuts off what sticks out (a third of a
-/// chart of lucy_100k of 21 squares).
-const SMALL: f64 = 60.0;
-
-/// And every curve along a narrow place at most about so many: a chart as long as the part and a thousandth as wide would
-/// have as many elements as all others together.
-const MOST_EDGES: f64 = 200.0;
 
 /// Gmsh asks every size field at every step: so many balls around spikes take it no longer than the mesh itself.
 const MOST_SPIKES: usize = 1_000;
@@ -96,10 +74,15 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64, monitor: &dyn Monitor) -> Result<
     };
     let distortions = distortions_of_written(charts, &natural, &linear);
     let algorithms = algorithms(charts, &linear, &distortions, size);
-    let narrow = narrow(charts, network, &algorithms.adapted, size);
+    let Places { narrow, balls } = places(mesh, charts, network, &algorithms.adapted, size);
     let mut spikes = spikes(mesh, charts, linear.curvatures(), size);
     let narrow_curves = narrow.iter().map(|n| n.curves.len()).sum();
-    let mut report = ExportReport { narrow_curves, spikes: spikes.len(), ..counted(report, &linear, &algorithms) };
+    let mut report = ExportReport {
+        narrow_curves,
+        narrow_places: balls.len(),
+        spikes: spikes.len(),
+        ..counted(report, &linear, &algorithms)
+    };
     if spikes.len() > MOST_SPIKES {
         report.warning.get_or_insert_with(|| too_coarse_for_spikes(size, spikes.len()));
         spikes.truncate(MOST_SPIKES);
@@ -108,7 +91,7 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64, monitor: &dyn Monitor) -> Result<
         tracing::warn!("hand-off to Gmsh: {warning}");
     }
     let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
-    let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow, spikes };
+    let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow, balls, spikes };
     Ok(Export { files: files(atlas, &linear, &script), report })
 }
 
@@ -138,131 +121,9 @@ fn distortions_of_written(
     distortions
 }
 
-/// The curves along narrow places and the small charts, by the size of elements there: half of `size`, a quarter, and so on.
-/// `adapted` are the charts that MeshAdapt makes, ascending.
-fn narrow(charts: &[CertifiedChart], network: &SeamNetwork, adapted: &[usize], size: f64) -> Vec<gmsh::Narrow> {
-    let mut found = Vec::new();
-    for halvings in 1..=gmsh::Narrow::HALVINGS {
-        found.push(gmsh::Narrow { size: size * 0.5_f64.powi(halvings as i32), ..gmsh::Narrow::default() });
-    }
-    for (curve, wanted) in network.curves().iter().zip(wanted_sizes(charts, network)) {
-        // However narrow the place, no smaller than gives that many edges.
-        if let Some(class) = size_class(size, wanted.max(curve.length() / MOST_EDGES)) {
-            found[class].curves.push(curve.id().index());
-            found[class].longest = found[class].longest.max(curve.length());
-        }
-    }
-    for chart in charts.iter().map(CertifiedChart::chart) {
-        let Extent { area, perimeter } = Extent::of(chart, network);
-        // Larger ones have smaller elements along their curves only.
-        if area > SMALL * size * size {
-            continue;
-        }
-        let is_adapted = adapted.binary_search(&chart.id().index()).is_ok();
-        let inside = if is_adapted { 0.5 * size } else { size };
-        if let Some(class) = size_class(size, inside.min(perimeter / EDGES_PER_LOOP)) {
-            found[class].surfaces.push(chart.id().index());
-        }
-    }
-    found.retain(|n| !n.curves.is_empty() || !n.surfaces.is_empty());
-    found
-}
-
-/// The class for elements of the `wanted` size: 0 for half of `size`, 1 for a quarter, and so on; none where `size` itself
-/// will do.
-fn size_class(size: f64, wanted: f64) -> Option<usize> {
-    if wanted < NARROW * size {
-        let halvings = (size / wanted).log2().round();
-        Some(halvings.clamp(1.0, f64::from(gmsh::Narrow::HALVINGS)) as usize - 1)
-    } else {
-        None
-    }
-}
-
 /// The area of a chart.
-fn area_of(chart: &Chart) -> f64 {
+pub(super) fn area_of(chart: &Chart) -> f64 {
     (0..chart.triangles().len()).map(|f| chart.area(f)).sum()
-}
-
-/// The length of a loop.
-fn length_of(turn: &[Passage], network: &SeamNetwork) -> f64 {
-    turn.iter().map(|p| network.curves()[p.curve.index()].length()).sum()
-}
-
-/// How large a chart is, in the unit of the input.
-struct Extent {
-    area: f64,
-    perimeter: f64,
-}
-
-impl Extent {
-    fn of(chart: &Chart, network: &SeamNetwork) -> Self {
-        let loops = network.loops(chart.id());
-        Self { area: area_of(chart), perimeter: loops.iter().map(|turn| length_of(turn, network)).sum() }
-    }
-
-    /// The width of a strip of any length, the radius of a disk.
-    fn width(&self) -> f64 {
-        2.0 * self.area / self.perimeter
-    }
-}
-
-/// The largest size of elements along each curve that its charts can do with.
-///
-/// Loops need a few edges each: Gmsh leaves charts with two nodes on their boundary out, and two charts with the same three
-/// nodes become the same triangle. A chart needs elements as small as it is wide, and a curve one edge.
-fn wanted_sizes(charts: &[CertifiedChart], network: &SeamNetwork) -> Vec<f64> {
-    let mut wanted: Vec<f64> = network.curves().iter().map(Curve::length).collect();
-    let sheets = sheets(charts.len(), network);
-    for chart in charts.iter().map(CertifiedChart::chart) {
-        let across = if sheets[chart.id().index()] { ACROSS_SHEETS } else { ELEMENTS_ACROSS };
-        let width = Extent::of(chart, network).width() / across;
-        for turn in network.loops(chart.id()) {
-            let size = width.min(length_of(turn, network) / EDGES_PER_LOOP);
-            for passage in turn {
-                let known = &mut wanted[passage.curve.index()];
-                *known = known.min(size);
-            }
-        }
-    }
-    wanted
-}
-
-/// Per chart, whether it shares two curves without a common end with another.
-fn sheets(charts: usize, network: &SeamNetwork) -> Vec<bool> {
-    // The ends of the curves that each pair of charts has been found to share.
-    let mut shared: BTreeMap<[usize; 2], Vec<[usize; 2]>> = BTreeMap::new();
-    let mut are_sheets = vec![false; charts];
-    for curve in network.curves() {
-        for [a, b] in pairs_beside(curve) {
-            let others = shared.entry([a, b]).or_default();
-            if others.iter().any(|other| are_disjoint(*other, curve.ends())) {
-                are_sheets[a] = true;
-                are_sheets[b] = true;
-            }
-            others.push(curve.ends());
-        }
-    }
-    are_sheets
-}
-
-/// The pairs of charts that meet along a curve, each with the smaller number first. A curve may have more than two sides.
-fn pairs_beside(curve: &Curve) -> Vec<[usize; 2]> {
-    let mut pairs = Vec::new();
-    for first in curve.sides() {
-        for second in curve.sides() {
-            let pair = [first.chart.index(), second.chart.index()];
-            if pair[0] < pair[1] {
-                pairs.push(pair);
-            }
-        }
-    }
-    pairs
-}
-
-/// Whether two curves with these ends have no end in common.
-fn are_disjoint(ends: [usize; 2], others: [usize; 2]) -> bool {
-    ends.iter().all(|end| !others.contains(end))
 }
 
 /// MeshAdapt where maps stretch, in a unit in which it searches little more than a tenth of an edge around a point.

@@ -477,6 +477,9 @@ pub struct ExportReport {
     /// Curves along narrow places, where remesh.geo asks for smaller elements.
     #[serde(default)]
     pub narrow_curves: usize,
+    /// Places where the boundary of a chart passes close to itself, around which remesh.geo asks for smaller elements.
+    #[serde(default)]
+    pub narrow_places: usize,
     /// Spikes and pits, where remesh.geo asks for smaller elements.
     #[serde(default)]
     pub spikes: usize,

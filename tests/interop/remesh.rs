@@ -313,8 +313,16 @@ fn rows_of_long_facets_are_whole() {
     let inputs = tempfile::tempdir().expect("a folder");
     let path = inputs.path().join("pill.obj");
     std::fs::write(&path, pill(64, 6)).expect("written");
+    // Natural maps do not stretch them.
     assert_eq!(out.run(&[&path], &["-q", "--feature-angle", "off"]).code, Some(0));
     let folder = out.of("pill.obj");
+    assert!(out.report("pill.obj").charts.iter().all(|c| c.distortion.conformal_p99 < 2.0), "as they are");
+    gmsh(&folder, |text| text);
+    let whole = check_mesh(&folder, &[]);
+    assert_eq!(whole.code, Some(0), "{}{}", whole.out, whole.err);
+    // Those onto the disk do.
+    let on_disk = ["-q", "--feature-angle", "off", "--boundary", "circle", "--force"];
+    assert_eq!(out.run(&[&path], &on_disk).code, Some(0));
     assert!(out.report("pill.obj").hand_off.is_some_and(|h| !h.adapted_charts.is_empty()), "maps stretch");
     // The known-bad twin: the algorithm that loses parts of such surfaces.
     let lost = whole_but_by(&folder, |text| {

@@ -5,8 +5,8 @@
 //! part of it that is connected to the point, beside the area of a disk of the same radius r. In the plane both are the
 //! same; at the tip of a cone of half-angle a, it is sin a; on a tube of circumference w, 2 w / (pi r) where r is above w.
 //!
-//! The ball has a radius of two edges. Where the share is below 0.6, elements must be smaller; with half the edge
-//! length the same is asked again, three times at most. Balls that reach beyond their chart are passed over: meshers
+//! The ball has a radius of two edges. Where the share is below 0.6, elements must be smaller, and where it is below 0.5 of a
+//! ball of three edges: those see fingers that are wider. With half the edge length the same is asked again, three times at most. Balls that reach beyond their chart are passed over: meshers
 //! put nodes on every seam, so that nothing is cut off there.
 //!
 //! *It ends.* Each halving looks at each vertex once, and each look at the triangles within a ball; around a vertex that was
@@ -32,6 +32,13 @@ const HALVINGS: u32 = 3;
 /// The radius of the balls, in edges. By experience: smaller balls find thinner places only, larger ones reach beyond
 /// their chart more often, and then tell nothing.
 const REACH: f64 = 2.0;
+
+/// Fingers are looked for in balls of so many edges, too: a tube of circumference w is above [`THIN`] in the smaller ones where
+/// w is more than 1.9 edges. Lucy_100k has one of 2.2 edges, three edges long, that Gmsh left out.
+const LONG_REACH: f64 = 3.0;
+
+/// Below this share of a disk a ball of that radius holds a finger: of a tube that is fewer than 2.4 edges around.
+const SLIM: f64 = 0.5;
 
 /// A mesh follows a cone as far as so many edges go around it; but from further away than [`FURTHEST`] edges none is looked
 /// after: a cone as sharp has no area to speak of.
@@ -92,7 +99,11 @@ pub fn spikes<C: AsRef<Chart>>(mesh: &SurfaceMesh, charts: &[C], curvatures: &[P
         let size = size * 0.5_f64.powi(halved as i32);
         let is_bent = |v: &usize| wanted[*v] && bends[*v] * size > BENT;
         let candidates: Vec<usize> = (0..wanted.len()).filter(is_bent).collect();
-        let thin = search.thin(&candidates, REACH * size);
+        search.within.fill(false);
+        let mut thin = search.thin(&candidates, REACH * size, THIN);
+        // What was found is found once.
+        let others: Vec<usize> = candidates.into_iter().filter(|v| !search.within[*v]).collect();
+        thin.extend(search.thin(&others, LONG_REACH * size, SLIM));
         if thin.is_empty() {
             break;
         }
@@ -178,14 +189,14 @@ impl<'a> Search<'a> {
         Self { mesh, chart, beside, seen, queue: Vec::new(), within }
     }
 
-    /// Those of `vertices` around which the surface is thin. Of several within half of `radius`, the first.
-    fn thin(&mut self, vertices: &[usize], radius: f64) -> Vec<Thin> {
+    /// Those of `vertices` around which the surface within `radius` has a share of less than `most` of a disk. Of several
+    /// within half of `radius`, the first. Marks what is `within` their balls.
+    fn thin(&mut self, vertices: &[usize], radius: f64, most: f64) -> Vec<Thin> {
         let mut is_done = vec![false; self.beside.len()];
-        self.within.fill(false);
         let mut thin = Vec::new();
         for v in vertices.iter().copied() {
             let Some(beside) = self.beside[v].filter(|_| !is_done[v]) else { continue };
-            let share = self.thin_share(v, beside, radius);
+            let share = self.thin_share(v, beside, radius, most);
             let is_thin = share.is_some();
             // What is as near is not looked at again: so a triangle lies in a bounded number of balls.
             let done = radius * if is_thin { 0.5 } else { 0.125 };
@@ -202,8 +213,8 @@ impl<'a> Search<'a> {
     }
 
     /// The area of the surface within `radius` of a vertex, which a triangle is `beside`, as a share of that of a disk; none
-    /// unless it is all in one chart, and thin. Leaves the triangles in `queue`.
-    fn thin_share(&mut self, vertex: usize, beside: FaceId, radius: f64) -> Option<f64> {
+    /// unless it is all in one chart, and less than `most`. Leaves the triangles in `queue`.
+    fn thin_share(&mut self, vertex: usize, beside: FaceId, radius: f64, most: f64) -> Option<f64> {
         let centre = self.mesh.points()[vertex];
         let disk = PI * radius * radius;
         let mut area = 0.0;
@@ -215,7 +226,7 @@ impl<'a> Search<'a> {
             next += 1;
             let corners = self.mesh.corners(face.index());
             area += area_within(corners, centre, radius);
-            if area >= THIN * disk {
+            if area >= most * disk {
                 return None;
             }
             for h in face.sides() {

@@ -2,6 +2,7 @@
 
 use crate::result_files::{ATLAS_MSH as ATLAS, ENLARGED_MSH as ENLARGED};
 use planish_core::measure::spikes::Spike;
+use planish_core::vec3::Vec3;
 
 /// From about this many triangles on, the script asks for the faster algorithm, which makes the worse triangles. Below
 /// it, meshing took 0.5 to 1.9 seconds on the files of docs/side_by_side.md.
@@ -22,7 +23,9 @@ pub struct Script {
     pub algorithms: Algorithms,
     /// Where elements are smaller.
     pub narrow: Vec<Narrow>,
-    /// Where they are, too.
+    /// Where they are, too: around places that are narrow.
+    pub balls: Vec<Ball>,
+    /// And in spikes and pits.
     pub spikes: Vec<Spike>,
 }
 
@@ -39,6 +42,19 @@ pub struct Narrow {
     pub longest: f64,
 }
 
+/// A ball in which elements are smaller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Its middle.
+    pub centre: Vec3,
+    /// How far elements of this size reach, in the unit of the input.
+    pub radius: f64,
+    /// Over which distance from there they become as large as elsewhere.
+    pub thickness: f64,
+    /// Their size.
+    pub size: f64,
+}
+
 impl Narrow {
     /// The sizes of narrow places: the size halved so often at most, to a thousandth. By experience: elements of less could
     /// outnumber all others.
@@ -50,7 +66,7 @@ impl Narrow {
 
     /// How much larger elements may become over a distance. By experience: less makes more small elements around narrow places,
     /// more makes elements lean where sizes change.
-    const GRADATION: f64 = 0.4;
+    pub const GRADATION: f64 = 0.4;
 }
 
 /// The algorithms that the script asks for.
@@ -64,9 +80,9 @@ pub struct Algorithms {
 
 /// The bytes of `remesh.geo`.
 pub fn remesh(script: &Script) -> Vec<u8> {
-    let Script { size, area, surfaces, curves, algorithms, narrow, spikes } = script;
+    let Script { size, area, surfaces, curves, algorithms, narrow, balls, spikes } = script;
     let factor = algorithms.enlarged;
-    let is_uniform = narrow.is_empty() && spikes.is_empty();
+    let is_uniform = narrow.is_empty() && balls.is_empty() && spikes.is_empty();
     format!(
         "// Remesh this surface through its certified maps:
 //
@@ -110,7 +126,7 @@ Mesh.AlgorithmSwitchOnFailure = 0;
         times = if factor == 1.0 { String::new() } else { format!(" * {factor}") },
         but = if is_uniform { "" } else { ", but in narrow places" },
         least = if is_uniform { String::new() } else { format!("1 / {} * ", 2_u32.pow(Narrow::HALVINGS)) },
-        fields = fields(narrow, spikes, factor),
+        fields = fields(narrow, balls, spikes, factor),
         adapted = adapted(&algorithms.adapted),
     )
     .into_bytes()
@@ -147,7 +163,7 @@ MeshAlgorithm Surface {{{}}} = 1;
 }
 
 /// Smaller elements in narrow places and spikes, and ever larger ones away from them.
-fn fields(narrow: &[Narrow], spikes: &[Spike], factor: f64) -> String {
+fn fields(narrow: &[Narrow], balls: &[Ball], spikes: &[Spike], factor: f64) -> String {
     let mut fields = Fields { factor, ..Fields::default() };
     if !narrow.is_empty() {
         fields.text += "
@@ -158,12 +174,20 @@ fn fields(narrow: &[Narrow], spikes: &[Spike], factor: f64) -> String {
         fields.around_curves(place);
         fields.on_surfaces(place);
     }
+    if !balls.is_empty() {
+        fields.text += "
+// Smaller elements where the boundary of a surface passes close to itself.
+";
+    }
+    balls.iter().for_each(|ball| fields.in_ball(ball));
     if !spikes.is_empty() {
         fields.text += "
 // Smaller elements in spikes and pits, the tips of which would be cut off.
 ";
     }
-    spikes.iter().for_each(|s| fields.in_ball(s));
+    for Spike { centre, radius, size } in spikes.iter().copied() {
+        fields.in_ball(&Ball { centre, radius, thickness: radius, size });
+    }
     fields.finished()
 }
 
@@ -227,15 +251,15 @@ impl Fields {
         self.sizes.push(constant);
     }
 
-    fn in_ball(&mut self, spike: &Spike) {
+    fn in_ball(&mut self, place: &Ball) {
         let factor = self.factor;
         let ball = self.begin("Ball");
-        for (axis, c) in ["XCenter", "YCenter", "ZCenter"].into_iter().zip(spike.centre) {
+        for (axis, c) in ["XCenter", "YCenter", "ZCenter"].into_iter().zip(place.centre) {
             self.option(axis, format!("{c} * {factor}"));
         }
-        self.option("Radius", format!("{} * {factor}", spike.radius));
-        self.option("Thickness", format!("{} * {factor}", spike.radius));
-        self.option("VIn", self.at_most(spike.size));
+        self.option("Radius", format!("{} * {factor}", place.radius));
+        self.option("Thickness", format!("{} * {factor}", place.thickness));
+        self.option("VIn", self.at_most(place.size));
         self.option("VOut", format!("size * {factor}"));
         self.sizes.push(ball);
     }

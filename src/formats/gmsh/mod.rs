@@ -7,7 +7,7 @@ mod geo;
 mod mesh;
 mod read;
 
-pub use geo::{Algorithms, Narrow, Script, remesh};
+pub use geo::{Algorithms, Ball, Narrow, Script, remesh};
 pub use read::{AtlasError, read as read_atlas};
 
 use binary::Binary;

@@ -97,3 +97,41 @@ fn areas_within_balls_are_those_of_circles() {
     let cap = 7.5 * 7.5 * (50.0_f64.sqrt() / 7.5).acos() - 0.5 * 50.0_f64.sqrt() * beyond;
     near(area_within([a, b, c], a, 7.5), PI / 4.0 * 7.5 * 7.5 - cap);
 }
+
+/// A disk whose middle is drawn out to a finger of the given length, with a round tip: `around` edges of about `step`.
+fn fingered_disk(length: f64, radius: f64, step: f64) -> TriangleSoup {
+    let around = (TAU * radius / step).round().max(8.0) as u32;
+    let mut profile = Vec::new();
+    for k in 1..=4 {
+        let angle = f64::from(k) / 4.0 * PI / 2.0;
+        profile.push([radius * angle.sin(), length + radius * angle.cos()]);
+    }
+    let rows = (length / step).ceil();
+    profile.extend((1..=rows as u32).map(|k| [radius, length * (1.0 - f64::from(k) / rows)]));
+    let out = (4.0 / step).ceil();
+    profile.extend((1..=out as u32).map(|k| [radius + 4.0 * f64::from(k) / out, 0.0]));
+    let mut points = vec![[0.0, 0.0, length + radius]];
+    for [r, z] in &profile {
+        for j in 0..around {
+            let angle = f64::from(j) * TAU / f64::from(around);
+            points.push([r * angle.cos(), r * angle.sin(), *z]);
+        }
+    }
+    let at = |k: u32, j: u32| 1 + k * around + j % around;
+    let mut triangles: Vec<[u32; 3]> = (0..around).map(|j| [0, at(0, j), at(0, j + 1)]).collect();
+    for (k, j) in (0..profile.len() as u32 - 1).flat_map(|k| (0..around).map(move |j| (k, j))) {
+        triangles.push([at(k, j), at(k + 1, j), at(k, j + 1)]);
+        triangles.push([at(k, j + 1), at(k + 1, j), at(k + 1, j + 1)]);
+    }
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn fingers_are_found_as_far_as_a_mesh_would_leave_them_out() {
+    let size = 0.4;
+    // So many edges around, and so many long.
+    for (around, length, is_found) in [(1.6, 4.0, true), (2.2, 4.0, true), (6.0, 4.0, false), (2.2, 0.2, false)] {
+        let spikes = found(&fingered_disk(length * size, around * size / TAU, 0.1), size);
+        assert_eq!(!spikes.is_empty(), is_found, "{around} around, {length} long: {spikes:?}");
+    }
+}
