@@ -268,4 +268,3 @@ fn pairs_beside(curve: &Curve) -> Vec<[usize; 2]> {
 fn are_disjoint(ends: [usize; 2], others: [usize; 2]) -> bool {
     ends.iter().all(|end| !others.contains(end))
 }
-

@@ -15,6 +15,10 @@ use std::collections::BTreeMap;
 /// the least size is reached.
 const AROUND: f64 = 3.0;
 
+/// Nor is a wiggle: along the boundary it is further than so many times the widest gap. Edges of that length pass over what
+/// returns sooner: along the seams of raw plates of marching cubes, which run in zigzag, there were gaps everywhere.
+const FAR: f64 = 1.0;
+
 /// Boundaries are looked at in pieces of this share of the widest gap that is asked for: a width is off by no more than that
 /// of a piece that is bent, and places are known as exactly.
 const PIECE: f64 = 0.125;
@@ -188,21 +192,24 @@ impl<'a> Near<'a> {
     fn width(&self, piece: &Piece, place: Vec3) -> f64 {
         let [x, y, z] = self.cell(place);
         let mut least = f64::INFINITY;
-        for cell in (0..27).map(|k| [x.saturating_add(k % 3 - 1), y.saturating_add(k / 3 % 3 - 1), z.saturating_add(k / 9 - 1)]) {
+        for cell in
+            (0..27).map(|k| [x.saturating_add(k % 3 - 1), y.saturating_add(k / 3 % 3 - 1), z.saturating_add(k / 9 - 1)])
+        {
             for other in self.cells.get(&cell).into_iter().flatten().map(|i| &self.pieces[*i as usize]) {
                 let (away, at) = other.nearest(place);
-                if away < least && is_apart(piece, other, at, away) {
+                if away < least && self.is_apart(piece, other, at, away) {
                     least = away;
                 }
             }
         }
         least
     }
-}
 
-/// Whether the place `at` on the loop of `other`, `away` from `piece`, is another part of the boundary and not around a
-/// corner.
-fn is_apart(piece: &Piece, other: &Piece, at: f64, away: f64) -> bool {
-    let between = (piece.at - at).abs();
-    other.first != piece.first || between.min(piece.around - between) > AROUND * away + 0.5 * piece.length
+    /// Whether the place `at` on the loop of `other`, `away` from `piece`, is another part of the boundary, not around a
+    /// corner or in a wiggle.
+    fn is_apart(&self, piece: &Piece, other: &Piece, at: f64, away: f64) -> bool {
+        let between = (piece.at - at).abs();
+        let between = between.min(piece.around - between);
+        other.first != piece.first || between > (AROUND * away).max(FAR * self.widest) + 0.5 * piece.length
+    }
 }

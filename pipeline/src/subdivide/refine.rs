@@ -251,7 +251,8 @@ impl<'a> Refiner<'a> {
         let (old, cells) = (&self.linear[chart], &self.maps[chart].cells);
         let kept = old.triangles.iter().zip(&old.faces).filter(|(_, f)| faces.binary_search(f).is_err());
         let (triangles, of) = kept.map(|(t, f)| (*t, *f)).unzip();
-        let mut fresh = LinearChart { nodes: old.nodes.clone(), uv: old.uv.clone(), triangles, faces: of, uv_scale: old.uv_scale };
+        let mut fresh =
+            LinearChart { nodes: old.nodes.clone(), uv: old.uv.clone(), triangles, faces: of, uv_scale: old.uv_scale };
         let corners = faces.iter().flat_map(|f| cells[*f as usize]);
         let mut local: BTreeMap<u32, u32> = corners.map(|n| (old.nodes[n as usize], n)).collect();
         for f in faces {

@@ -191,8 +191,8 @@ mod tests {
     use super::super::super::BoundaryShape;
     use super::super::super::complex::Complex;
     use super::super::super::dual::Dual;
-    use super::super::super::regions::Regions;
     use super::super::super::patches::compact_cells;
+    use super::super::super::regions::Regions;
     use super::super::{CellGraph, predict};
     use super::overlap;
     use crate::mesh::TriangleSoup;
