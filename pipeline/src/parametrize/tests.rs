@@ -10,7 +10,7 @@ use crate::map::quadratic::quadratic_map;
 use crate::monitor::NoMonitor;
 use crate::settings::{BoundaryShape, ChartSettings, Order};
 use crate::vec3::Vec3;
-use crate::{repair, shapes};
+use crate::{repair, shapes, untangle};
 
 /// A surface as one chart.
 fn whole(soup: &TriangleSoup) -> Chart {
@@ -212,4 +212,43 @@ fn where_the_harmonic_map_folds_inside_the_natural_boundary_another_linear_one_i
         start.nodes[vertex] == map.nodes[vertex]
     }));
     assert_ne!(start, map);
+}
+
+/// A round plate with a round boss on it, the wall of which is one row of facets as long as it is high.
+fn boss(around: u32, height: f64) -> TriangleSoup {
+    let rings = [[4.0, 0.0], [3.0, 0.0], [2.0, 0.0], [1.0, 0.0], [1.0, height], [0.5, height]];
+    let mut points = Vec::new();
+    for [radius, z] in rings {
+        for j in 0..around {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(j) / f64::from(around)).sin_cos();
+            points.push([radius * cos, radius * sin, z]);
+        }
+    }
+    let tip = points.len() as u32;
+    points.push([0.0, 0.0, height]);
+    let at = |ring: u32, j: u32| ring * around + j % around;
+    let mut triangles = Vec::new();
+    for j in 0..around {
+        for ring in 0..rings.len() as u32 - 1 {
+            triangles.push([at(ring, j), at(ring, j + 1), at(ring + 1, j)]);
+            triangles.push([at(ring, j + 1), at(ring + 1, j + 1), at(ring + 1, j)]);
+        }
+        triangles.push([at(rings.len() as u32 - 1, j), at(rings.len() as u32 - 1, j + 1), tip]);
+    }
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn a_wall_of_long_facets_is_no_worse_than_the_map_that_untangling_starts_from() {
+    for height in [1.0, 1.5, 2.0, 3.0] {
+        let charts = naturally(&boss(48, height));
+        let [chart] = &charts[..] else { panic!("{} charts", charts.len()) };
+        assert_eq!(chart.provenance().boundary, BoundaryFound::Natural);
+        let p99 = chart.distortion().conformal_p99;
+        assert!(p99 < 4.0, "height {height}: {p99}");
+        // On the low one the harmonic map is valid. On the others what untangling makes of it is 71 to 178.
+        let method = chart.provenance().untangle.as_ref().map(|u| u.method);
+        let expected = if height == 1.0 { untangle::Method::Harmonic } else { untangle::Method::Start };
+        assert_eq!(method, Some(expected), "height {height}");
+    }
 }

@@ -58,8 +58,8 @@ pub enum NoNatural {
         /// The area ratio.
         ratio: f64,
     },
-    /// The map stretches more than that of the disk: an annulus of needles is no ring.
-    #[error("the natural map has a conformal distortion of {conformal_p99:.3e}, more than that of the disk")]
+    /// Another boundary stretches less: that of the disk (an annulus of needles is no ring), or one that is freed.
+    #[error("the natural map has a conformal distortion of {conformal_p99:.3e}, and another boundary stretches less")]
     Stretched {
         /// What 99 % of the area do not exceed.
         conformal_p99: f64,
