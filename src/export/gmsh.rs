@@ -13,6 +13,7 @@ use planish_core::measure::spikes::spikes;
 use planish_core::monitor::{Interrupted, Monitor};
 use planish_core::subdivide::{self, LinearAtlas, subdivide};
 use planish_core::topology::{ChartId, FaceId};
+use planish_core::untangle;
 use planish_core::vec3::unit_scale;
 use planish_core::{CertifiedAtlas, CertifiedChart};
 
@@ -26,7 +27,8 @@ const STRETCHED: f64 = 10.0;
 /// gamma of cad_gmsh_t13, at 2.6, by Frontal-Delaunay 0.09, by MeshAdapt 0.50; of patch_10ks, at 7.1, 0.11 and 0.35).
 const BENT: f64 = 2.0;
 
-/// The same for such charts whose boundary is freed. Least gamma by Frontal-Delaunay and by MeshAdapt: of airplane_netgen, at
+/// The same for such charts whose boundary is freed, or natural with the map that untangling starts from: their maps are linear
+/// on triangles, and change from one to the next. Least gamma by Frontal-Delaunay and by MeshAdapt: of airplane_netgen, at
 /// 6.3, 0.08 and 0.50; of gebco_seabed, at 3.2, 0.05 and 0.26; of the shell of cad_rear_case, at 2.3, 0.1 and 0.02.
 const OPENED: f64 = 2.5;
 
@@ -146,10 +148,11 @@ fn stretches(certified: &CertifiedChart, linear: &LinearAtlas, distortion: &Summ
     }
     let is_quick = area_of(chart) < QUICK * size * size && distortion.area_ratio < EVEN;
     let is_straight = linear.straight_charts().binary_search(&chart.id()).is_ok();
+    let is_start = certified.provenance().untangle.as_ref().is_some_and(|u| u.method == untangle::Method::Start);
     let most = match certified.provenance().boundary {
         _ if is_straight || !is_quick => STRETCHED,
-        BoundaryFound::Natural => STRETCHED,
-        BoundaryFound::Freed { .. } => OPENED,
+        BoundaryFound::Natural if !is_start => STRETCHED,
+        BoundaryFound::Natural | BoundaryFound::Freed { .. } => OPENED,
         BoundaryFound::Circle { .. } => BENT,
     };
     distortion.conformal_p99 > most

@@ -8,6 +8,7 @@ use planish_core::atlas::Chart;
 use planish_core::certified::NARROW;
 use planish_core::mesh::SurfaceMesh;
 use planish_core::seams::{Curve, Gap, Passage, SeamNetwork};
+use planish_core::topology::ChartId;
 use planish_core::vec3::{Vec3, distance};
 use std::collections::BTreeMap;
 
@@ -66,21 +67,32 @@ pub(super) fn places(
     size: f64,
 ) -> Places {
     let mut wanted = wanted_sizes(charts, network);
-    let balls = balls(mesh, network, size, &mut wanted);
+    let balls = balls(mesh, charts, network, size, &mut wanted);
     Places { narrow: narrow(charts, network, adapted, size, &wanted), balls }
 }
 
 /// Balls around the places where boundaries pass close to themselves, but where the sizes `wanted` along the curves see to
 /// that; those are lowered where a curve has too many places.
-fn balls(mesh: &SurfaceMesh, network: &SeamNetwork, size: f64, wanted: &mut [f64]) -> Vec<Ball> {
+fn balls(
+    mesh: &SurfaceMesh,
+    charts: &[CertifiedChart],
+    network: &SeamNetwork,
+    size: f64,
+    wanted: &mut [f64],
+) -> Vec<Ball> {
     let mut of_curves: BTreeMap<usize, Vec<Place>> = BTreeMap::new();
-    for Gap { curve, place, width } in network.gaps(mesh, NARROW * size) {
-        of_curves.entry(curve.index()).or_default().push(Place { at: place, size: width.max(LEAST * size) });
+    // Charts that are as narrow all over have elements as small along all of their curves already.
+    let is_wide = |chart: &&CertifiedChart| Extent::of(chart.chart(), network).width() > ELEMENTS_ACROSS * LEAST * size;
+    for chart in charts.iter().filter(is_wide) {
+        for (curve, places) in places_beside(mesh, chart.id(), network, size) {
+            of_curves.entry(curve).or_default().extend(places);
+        }
     }
     let mut places = Vec::new();
     for (curve, mut of_curve) in of_curves {
         let length = network.curves()[curve].length();
         of_curve.retain(|place| !is_enough(place.size, size, wanted[curve], length));
+        // Charts on both sides have found what is narrow for them.
         let mut apart = spread(of_curve, PLACES_PER_CURVE + 1);
         if let Some(many) = apart.get(PLACES_PER_CURVE) {
             wanted[curve] = wanted[curve].min(many.size);
@@ -97,6 +109,15 @@ fn balls(mesh: &SurfaceMesh, network: &SeamNetwork, size: f64, wanted: &mut [f64
         size: place.size,
     };
     spread(places, MOST_PLACES).into_iter().map(ball).collect()
+}
+
+/// The narrowest places of each curve beside a chart, one more than get a ball.
+fn places_beside(mesh: &SurfaceMesh, chart: ChartId, network: &SeamNetwork, size: f64) -> BTreeMap<usize, Vec<Place>> {
+    let mut of_curves: BTreeMap<usize, Vec<Place>> = BTreeMap::new();
+    for Gap { curve, place, width } in network.gaps(mesh, chart, NARROW * size) {
+        of_curves.entry(curve.index()).or_default().push(Place { at: place, size: width.max(LEAST * size) });
+    }
+    of_curves.into_iter().map(|(curve, places)| (curve, spread(places, PLACES_PER_CURVE + 1))).collect()
 }
 
 /// A place and the size of elements there.
