@@ -8,7 +8,6 @@ use planish_core::atlas::Chart;
 use planish_core::certified::NARROW;
 use planish_core::mesh::SurfaceMesh;
 use planish_core::seams::{Curve, Gap, Passage, SeamNetwork};
-use planish_core::topology::ChartId;
 use planish_core::vec3::{Vec3, distance};
 use std::collections::BTreeMap;
 
@@ -32,12 +31,12 @@ const SMALL: f64 = 60.0;
 /// have as many elements as all others together.
 const MOST_EDGES: f64 = 200.0;
 
-/// Elements are no smaller than this share of the size where a boundary passes close to itself: at sharp corners it does at
-/// any size. Of cad_fixture_vtk 18 elements below gamma 0.1 are left without, 4 with a sixteenth, none with this, one with half
-/// of it and more triangles.
+/// Elements are no smaller than this share of the size where a boundary passes close to itself. Of cad_fixture_vtk 18 elements
+/// below gamma 0.1 are left without any of this, 4 with a sixteenth, none with this.
 const LEAST: f64 = 1.0 / 32.0;
 
-/// So many places of a curve get smaller elements around them; where there are more of them, the whole curve does.
+/// So many places of a curve, the narrowest, get smaller elements around them. More would make all of a seam fine that runs in
+/// zigzag, as on raw marching cubes (plate_genus9: edges of a quarter of the size, in the median).
 const PLACES_PER_CURVE: usize = 8;
 
 /// So many places altogether, the narrowest: Gmsh asks every size field at every step, and spends as much time on these as on
@@ -72,7 +71,7 @@ pub(super) fn places(
 }
 
 /// Balls around the places where boundaries pass close to themselves, but where the sizes `wanted` along the curves see to
-/// that; those are lowered where a curve has too many places.
+/// that; those are lowered where half of a curve is as narrow.
 fn balls(
     mesh: &SurfaceMesh,
     charts: &[CertifiedChart],
@@ -84,21 +83,22 @@ fn balls(
     // Charts that are as narrow all over have elements as small along all of their curves already.
     let is_wide = |chart: &&CertifiedChart| Extent::of(chart.chart(), network).width() > ELEMENTS_ACROSS * LEAST * size;
     for chart in charts.iter().filter(is_wide) {
-        for (curve, places) in places_beside(mesh, chart.id(), network, size) {
-            of_curves.entry(curve).or_default().extend(places);
+        for gaps in gaps_by_curves(network.gaps(mesh, chart.id(), NARROW * size)) {
+            let curve = gaps[0].curve.index();
+            if let Some(width) = narrower_half(&gaps, network.curves()[curve].length()) {
+                wanted[curve] = wanted[curve].min(width.max(LEAST * size));
+            }
+            let place = |gap: Gap| Place { at: gap.place, size: gap.width.max(LEAST * size) };
+            // Of the other charts beside the curve there may be more.
+            let narrowest = spread(gaps.into_iter().map(place).collect(), PLACES_PER_CURVE);
+            of_curves.entry(curve).or_default().extend(narrowest);
         }
     }
     let mut places = Vec::new();
     for (curve, mut of_curve) in of_curves {
         let length = network.curves()[curve].length();
         of_curve.retain(|place| !is_enough(place.size, size, wanted[curve], length));
-        // Charts on both sides have found what is narrow for them.
-        let mut apart = spread(of_curve, PLACES_PER_CURVE + 1);
-        if let Some(many) = apart.get(PLACES_PER_CURVE) {
-            wanted[curve] = wanted[curve].min(many.size);
-            apart.retain(|place| !is_enough(place.size, size, wanted[curve], length));
-        }
-        places.extend(apart);
+        places.extend(spread(of_curve, PLACES_PER_CURVE));
     }
     // Seams have two charts, and places lie where curves end.
     let thickness = |place: &Place| (size - place.size) / gmsh::Narrow::GRADATION;
@@ -111,13 +111,24 @@ fn balls(
     spread(places, MOST_PLACES).into_iter().map(ball).collect()
 }
 
-/// The narrowest places of each curve beside a chart, one more than get a ball.
-fn places_beside(mesh: &SurfaceMesh, chart: ChartId, network: &SeamNetwork, size: f64) -> BTreeMap<usize, Vec<Place>> {
-    let mut of_curves: BTreeMap<usize, Vec<Place>> = BTreeMap::new();
-    for Gap { curve, place, width } in network.gaps(mesh, chart, NARROW * size) {
-        of_curves.entry(curve.index()).or_default().push(Place { at: place, size: width.max(LEAST * size) });
+/// Gaps curve by curve.
+fn gaps_by_curves(mut gaps: Vec<Gap>) -> Vec<Vec<Gap>> {
+    gaps.sort_by_key(|gap| gap.curve);
+    gaps.chunk_by(|a, b| a.curve == b.curve).map(<[Gap]>::to_vec).collect()
+}
+
+/// The least width that half of the length of a curve does not exceed; none where less of it is narrow.
+fn narrower_half(gaps: &[Gap], length: f64) -> Option<f64> {
+    let mut sorted: Vec<&Gap> = gaps.iter().collect();
+    sorted.sort_by(|a, b| a.width.total_cmp(&b.width));
+    let mut passed = 0.0;
+    for gap in sorted {
+        passed += gap.length;
+        if passed >= 0.5 * length {
+            return Some(gap.width);
+        }
     }
-    of_curves.into_iter().map(|(curve, places)| (curve, spread(places, PLACES_PER_CURVE + 1))).collect()
+    None
 }
 
 /// A place and the size of elements there.

@@ -10,14 +10,10 @@ use crate::topology::{ChartId, CurveId};
 use crate::vec3::{Vec3, distance, dot, sub};
 use std::collections::BTreeMap;
 
-/// A corner is no gap: along the boundary it is not further than so many times the distance. At a corner of angle a they are
-/// as 1 to sin(a/2), so that corners below 39 degrees count: elements as small as their sides are near do not lean there until
-/// the least size is reached.
-const AROUND: f64 = 3.0;
-
-/// Nor is a wiggle: along the boundary it is further than so many times the widest gap. Edges of that length pass over what
-/// returns sooner: along the seams of raw plates of marching cubes, which run in zigzag, there were gaps everywhere.
-const FAR: f64 = 1.0;
+/// Around a corner is no other part, nor is what a wiggle comes back to: along the boundary that is further than so many times
+/// the widest gap. With 1, there were gaps everywhere along seams of raw plates of marching cubes, which run in zigzag and
+/// around slivers, and at sharp corners, where elements lean as the corner does, however small they are.
+const FAR: f64 = 4.0;
 
 /// Boundaries are looked at in pieces of this share of the widest gap that is asked for: a width is off by no more than that
 /// of a piece that is bent, and places are known as exactly.
@@ -36,6 +32,8 @@ pub struct Gap {
     pub place: Vec3,
     /// How far it is from there to the other part, in the unit of the input.
     pub width: f64,
+    /// How much of the curve it stands for, likewise.
+    pub length: f64,
 }
 
 impl SeamNetwork {
@@ -44,7 +42,7 @@ impl SeamNetwork {
     ///
     /// # Example
     ///
-    /// A strip a tenth as wide as long is narrow all along, but for its ends: what lies around a corner is no other part.
+    /// A strip is narrow all along, but for its ends: what lies around a corner is no other part.
     ///
     /// ```
     /// use planish_core::decompose::assemble;
@@ -53,13 +51,13 @@ impl SeamNetwork {
     /// use planish_core::seams::SeamNetwork;
     /// use planish_core::topology::ChartId;
     ///
-    /// let points = vec![[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let points = vec![[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [40.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
     /// let soup = TriangleSoup::new(points, vec![[0, 1, 2], [0, 2, 3]])?;
     /// let mesh = repair(&soup, &repair::Settings::default())?.mesh;
     /// let network = SeamNetwork::new(&mesh, assemble(&mesh, &[0, 0])?.charts(), 0.0);
     /// let gaps = network.gaps(&mesh, ChartId(0), 2.0);
-    /// assert!(gaps.iter().all(|gap| (gap.width - 1.0).abs() < 1e-9 && gap.place[0] > 0.9 && gap.place[0] < 9.1));
-    /// assert!(gaps.len() > 40 && network.gaps(&mesh, ChartId(0), 0.9).is_empty());
+    /// assert!(gaps.iter().all(|gap| (gap.width - 1.0).abs() < 1e-9 && gap.place[0] > 3.4 && gap.place[0] < 36.6));
+    /// assert!(gaps.len() > 200 && network.gaps(&mesh, ChartId(0), 0.9).is_empty());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn gaps(&self, mesh: &SurfaceMesh, chart: ChartId, widest: f64) -> Vec<Gap> {
@@ -191,7 +189,7 @@ impl<'a> Near<'a> {
         let mut gaps = Vec::new();
         for (piece, width) in self.pieces.iter().zip(widths) {
             if width < self.widest {
-                gaps.push(Gap { curve: piece.curve, place: piece.middle(), width });
+                gaps.push(Gap { curve: piece.curve, place: piece.middle(), width, length: piece.length });
             }
         }
         gaps
@@ -218,17 +216,15 @@ impl<'a> Near<'a> {
                 continue;
             }
             let (away, at) = other.nearest(place);
-            if away < least && self.is_apart(piece, other, at, away) {
+            if away < least && self.is_apart(piece, other, at) {
                 least = away;
             }
         }
         least
     }
 
-    /// Whether the place `at` on the loop of `other`, `away` from `piece`, is another part of the boundary, not around a
-    /// corner or in a wiggle.
-    fn is_apart(&self, piece: &Piece, other: &Piece, at: f64, away: f64) -> bool {
-        let least = (AROUND * away).max(FAR * self.widest) + 0.5 * piece.length;
-        other.first != piece.first || piece.between(at) > least
+    /// Whether the place `at` on the loop of `other` is another part of the boundary (see [`FAR`]).
+    fn is_apart(&self, piece: &Piece, other: &Piece, at: f64) -> bool {
+        other.first != piece.first || piece.between(at) > FAR * self.widest + 0.5 * piece.length
     }
 }
