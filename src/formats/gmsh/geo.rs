@@ -287,11 +287,11 @@ mod tests {
     use super::*;
 
     fn script(algorithms: Algorithms, narrow: Vec<Narrow>) -> String {
-        script_with(algorithms, narrow, vec![])
+        script_with(algorithms, narrow, vec![], vec![])
     }
 
-    fn script_with(algorithms: Algorithms, narrow: Vec<Narrow>, spikes: Vec<Spike>) -> String {
-        let script = Script { size: 0.1 + 0.2, area: 4.5, surfaces: 2, curves: 1, algorithms, narrow, spikes };
+    fn script_with(algorithms: Algorithms, narrow: Vec<Narrow>, balls: Vec<Ball>, spikes: Vec<Spike>) -> String {
+        let script = Script { size: 0.1 + 0.2, area: 4.5, surfaces: 2, curves: 1, algorithms, narrow, balls, spikes };
         String::from_utf8(remesh(&script)).expect("UTF-8")
     }
 
@@ -330,16 +330,21 @@ mod tests {
     }
 
     #[test]
-    fn spikes_have_balls() {
+    fn spikes_and_gaps_have_balls() {
         let spike = Spike { centre: [0.5, -1.0, 2e-7], radius: 0.6, size: 0.15 };
-        let text = script_with(Algorithms { adapted: vec![], enlarged: 4.0 }, vec![], vec![spike]);
+        let gap = Ball { centre: [3.0, 0.0, 0.0], radius: 0.05, thickness: 0.4, size: 0.025 };
+        let text = script_with(Algorithms { adapted: vec![], enlarged: 4.0 }, vec![], vec![gap], vec![spike]);
         for line in [
-            "Field[1] = Ball;",
-            "Field[1].YCenter = -1 * 4;",
-            "Field[1].ZCenter = 0.0000002 * 4;",
-            "Field[1].Radius = 0.6 * 4;",
-            "Field[1].VIn = (size < 0.15 ? size : 0.15) * 4;",
-            "Background Field = 2;",
+            "Field[1].XCenter = 3 * 4;",
+            "Field[1].Thickness = 0.4 * 4;",
+            "Field[1].VIn = (size < 0.025 ? size : 0.025) * 4;",
+            "Field[2] = Ball;",
+            "Field[2].Thickness = 0.6 * 4;",
+            "Field[2].YCenter = -1 * 4;",
+            "Field[2].ZCenter = 0.0000002 * 4;",
+            "Field[2].Radius = 0.6 * 4;",
+            "Field[2].VIn = (size < 0.15 ? size : 0.15) * 4;",
+            "Background Field = 3;",
         ] {
             assert!(text.contains(line), "{line} is not in\n{text}");
         }
