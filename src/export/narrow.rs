@@ -8,6 +8,7 @@ use planish_core::atlas::Chart;
 use planish_core::certified::NARROW;
 use planish_core::mesh::SurfaceMesh;
 use planish_core::seams::{Curve, Gap, Passage, SeamNetwork};
+use planish_core::topology::ChartId;
 use planish_core::vec3::{Vec3, distance};
 use std::collections::BTreeMap;
 
@@ -65,56 +66,41 @@ pub(super) fn places(
     adapted: &[usize],
     size: f64,
 ) -> Places {
-    let mut wanted = wanted_sizes(charts, network);
-    let balls = balls(mesh, charts, network, size, &mut wanted);
-    Places { narrow: narrow(charts, network, adapted, size, &wanted), balls }
+    let extents: Vec<Extent> = charts.iter().map(|chart| Extent::of(chart.chart(), network)).collect();
+    let mut wanted = wanted_sizes(&extents, network);
+    let balls = balls(mesh, &extents, network, size, &mut wanted);
+    Places { narrow: narrow(&extents, network, adapted, size, &wanted), balls }
 }
 
 /// Balls around the places where boundaries pass close to themselves, but where the sizes `wanted` along the curves see to
 /// that; those are lowered where half of a curve is as narrow.
-fn balls(
-    mesh: &SurfaceMesh,
-    charts: &[CertifiedChart],
-    network: &SeamNetwork,
-    size: f64,
-    wanted: &mut [f64],
-) -> Vec<Ball> {
+fn balls(mesh: &SurfaceMesh, extents: &[Extent], network: &SeamNetwork, size: f64, wanted: &mut [f64]) -> Vec<Ball> {
+    let needed = |width: f64| width.max(LEAST * size);
     let mut of_curves: BTreeMap<usize, Vec<Place>> = BTreeMap::new();
     // Charts that are as narrow all over have elements as small along all of their curves already.
-    let is_wide = |chart: &&CertifiedChart| Extent::of(chart.chart(), network).width() > ELEMENTS_ACROSS * LEAST * size;
-    for chart in charts.iter().filter(is_wide) {
-        for gaps in gaps_by_curves(network.gaps(mesh, chart.id(), NARROW * size)) {
+    let wide = extents.iter().filter(|extent| extent.width() > ELEMENTS_ACROSS * LEAST * size);
+    for chart in wide.map(|extent| extent.chart) {
+        let mut gaps = network.gaps(mesh, chart, NARROW * size);
+        gaps.sort_by_key(|gap| gap.curve);
+        for gaps in gaps.chunk_by(|a, b| a.curve == b.curve) {
             let curve = gaps[0].curve.index();
-            if let Some(width) = narrower_half(&gaps, network.curves()[curve].length()) {
-                wanted[curve] = wanted[curve].min(width.max(LEAST * size));
+            if let Some(width) = narrower_half(gaps, network.curves()[curve].length()) {
+                wanted[curve] = wanted[curve].min(needed(width));
             }
-            let place = |gap: Gap| Place { at: gap.place, size: gap.width.max(LEAST * size) };
-            // Of the other charts beside the curve there may be more.
-            let narrowest = spread(gaps.into_iter().map(place).collect(), PLACES_PER_CURVE);
-            of_curves.entry(curve).or_default().extend(narrowest);
+            let places = gaps.iter().map(|gap| Place { at: gap.place, size: needed(gap.width) }).collect();
+            // Only so many are kept of each chart: along all of a seam there may be millions.
+            of_curves.entry(curve).or_default().extend(spread(places, PLACES_PER_CURVE));
         }
     }
     let mut places = Vec::new();
     for (curve, mut of_curve) in of_curves {
         let length = network.curves()[curve].length();
         of_curve.retain(|place| !is_enough(place.size, size, wanted[curve], length));
+        // The charts on both sides have found places.
         places.extend(spread(of_curve, PLACES_PER_CURVE));
     }
-    // Seams have two charts, and places lie where curves end.
-    let thickness = |place: &Place| (size - place.size) / gmsh::Narrow::GRADATION;
-    let ball = |place: Place| Ball {
-        centre: place.at,
-        radius: REACH * place.size,
-        thickness: thickness(&place),
-        size: place.size,
-    };
-    spread(places, MOST_PLACES).into_iter().map(ball).collect()
-}
-
-/// Gaps curve by curve.
-fn gaps_by_curves(mut gaps: Vec<Gap>) -> Vec<Vec<Gap>> {
-    gaps.sort_by_key(|gap| gap.curve);
-    gaps.chunk_by(|a, b| a.curve == b.curve).map(<[Gap]>::to_vec).collect()
+    // Curves meet, and pass each other.
+    spread(places, MOST_PLACES).into_iter().map(|place| place.ball(size)).collect()
 }
 
 /// The least width that half of the length of a curve does not exceed; none where less of it is narrow.
@@ -136,6 +122,14 @@ fn narrower_half(gaps: &[Gap], length: f64) -> Option<f64> {
 struct Place {
     at: Vec3,
     size: f64,
+}
+
+impl Place {
+    /// The ball around it, from which elements grow up to `size`.
+    fn ball(self, size: f64) -> Ball {
+        let thickness = (size - self.size) / gmsh::Narrow::GRADATION;
+        Ball { centre: self.at, radius: REACH * self.size, thickness, size: self.size }
+    }
 }
 
 /// Whether elements of the size that a curve gets are small enough.
@@ -177,7 +171,7 @@ fn spread(mut places: Vec<Place>, most: usize) -> Vec<Place> {
 
 /// The curves along narrow places and the small charts, by the size of elements there: half of `size`, a quarter, and so on.
 fn narrow(
-    charts: &[CertifiedChart],
+    extents: &[Extent],
     network: &SeamNetwork,
     adapted: &[usize],
     size: f64,
@@ -193,16 +187,15 @@ fn narrow(
             found[class].longest = found[class].longest.max(curve.length());
         }
     }
-    for chart in charts.iter().map(CertifiedChart::chart) {
-        let Extent { area, perimeter } = Extent::of(chart, network);
+    for Extent { chart, area, perimeter } in extents.iter().copied() {
         // Larger ones have smaller elements along their curves only.
         if area > SMALL * size * size {
             continue;
         }
-        let is_adapted = adapted.binary_search(&chart.id().index()).is_ok();
+        let is_adapted = adapted.binary_search(&chart.index()).is_ok();
         let inside = if is_adapted { 0.5 * size } else { size };
         if let Some(class) = size_class(size, inside.min(perimeter / EDGES_PER_LOOP)) {
-            found[class].surfaces.push(chart.id().index());
+            found[class].surfaces.push(chart.index());
         }
     }
     found.retain(|n| !n.curves.is_empty() || !n.surfaces.is_empty());
@@ -226,7 +219,9 @@ fn length_of(turn: &[Passage], network: &SeamNetwork) -> f64 {
 }
 
 /// How large a chart is, in the unit of the input.
+#[derive(Clone, Copy)]
 struct Extent {
+    chart: ChartId,
     area: f64,
     perimeter: f64,
 }
@@ -234,7 +229,11 @@ struct Extent {
 impl Extent {
     fn of(chart: &Chart, network: &SeamNetwork) -> Self {
         let loops = network.loops(chart.id());
-        Self { area: area_of(chart), perimeter: loops.iter().map(|turn| length_of(turn, network)).sum() }
+        Self {
+            chart: chart.id(),
+            area: area_of(chart),
+            perimeter: loops.iter().map(|turn| length_of(turn, network)).sum(),
+        }
     }
 
     /// The width of a strip of any length, the radius of a disk.
@@ -247,13 +246,13 @@ impl Extent {
 ///
 /// Loops need a few edges each: Gmsh leaves charts with two nodes on their boundary out, and two charts with the same three
 /// nodes become the same triangle. A chart needs elements as small as it is wide, and a curve one edge.
-fn wanted_sizes(charts: &[CertifiedChart], network: &SeamNetwork) -> Vec<f64> {
+fn wanted_sizes(extents: &[Extent], network: &SeamNetwork) -> Vec<f64> {
     let mut wanted: Vec<f64> = network.curves().iter().map(Curve::length).collect();
-    let sheets = sheets(charts.len(), network);
-    for chart in charts.iter().map(CertifiedChart::chart) {
-        let across = if sheets[chart.id().index()] { ACROSS_SHEETS } else { ELEMENTS_ACROSS };
-        let width = Extent::of(chart, network).width() / across;
-        for turn in network.loops(chart.id()) {
+    let sheets = sheets(extents.len(), network);
+    for extent in extents {
+        let across = if sheets[extent.chart.index()] { ACROSS_SHEETS } else { ELEMENTS_ACROSS };
+        let width = extent.width() / across;
+        for turn in network.loops(extent.chart) {
             let size = width.min(length_of(turn, network) / EDGES_PER_LOOP);
             for passage in turn {
                 let known = &mut wanted[passage.curve.index()];

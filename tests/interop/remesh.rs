@@ -290,11 +290,16 @@ fn real_parts_come_out_whole_and_with_good_elements() {
     }
 }
 
-/// The mesh by a result's own script is faithful and fine; what is said of the one by the script that was changed, which is not.
-fn whole_but_by(folder: &Path, change: impl Fn(String) -> String) -> Ended {
+/// The mesh by a result's own script is faithful and fine.
+fn assert_meshed_whole(folder: &Path) {
     gmsh(folder, |text| text);
     let whole = check_mesh(folder, &[]);
     assert_eq!(whole.code, Some(0), "{}{}", whole.out, whole.err);
+}
+
+/// The mesh by a result's own script is faithful and fine; what is said of the one by the script that was changed, which is not.
+fn whole_but_by(folder: &Path, change: impl Fn(String) -> String) -> Ended {
+    assert_meshed_whole(folder);
     gmsh(folder, change);
     let lost = check_mesh(folder, &[]);
     assert_eq!(lost.code, Some(1), "{}", lost.out);
@@ -305,20 +310,17 @@ fn whole_but_by(folder: &Path, change: impl Fn(String) -> String) -> Ended {
 #[test]
 fn rows_of_long_facets_are_whole() {
     let out = Out::new();
-    let inputs = tempfile::tempdir().expect("a folder");
-    let path = inputs.path().join("pill.obj");
-    std::fs::write(&path, pill(64, 6)).expect("written");
+    let (pill, folder) = (pill(64, 6), out.of("pill.obj"));
     // Natural maps do not stretch them.
-    assert_eq!(out.run(&[&path], &["-q", "--feature-angle", "off"]).code, Some(0));
-    let folder = out.of("pill.obj");
-    assert!(out.report("pill.obj").charts.iter().all(|c| c.distortion.conformal_p99 < 2.0), "as they are");
-    gmsh(&folder, |text| text);
-    let whole = check_mesh(&folder, &[]);
-    assert_eq!(whole.code, Some(0), "{}{}", whole.out, whole.err);
+    let (ended, report) = out.run_bytes_with("pill.obj", pill.as_bytes(), &["-q", "--feature-angle", "off"]);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+    assert!(report.charts.iter().all(|c| c.distortion.conformal_p99 < 2.0), "as they are");
+    assert_meshed_whole(&folder);
     // Those onto the disk do.
     let on_disk = ["-q", "--feature-angle", "off", "--boundary", "circle", "--force"];
-    assert_eq!(out.run(&[&path], &on_disk).code, Some(0));
-    assert!(out.report("pill.obj").hand_off.is_some_and(|h| !h.adapted_charts.is_empty()), "maps stretch");
+    let (ended, report) = out.run_bytes_with("pill.obj", pill.as_bytes(), &on_disk);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+    assert!(report.hand_off.is_some_and(|h| !h.adapted_charts.is_empty()), "maps stretch");
     // The known-bad twin: the algorithm that loses parts of such surfaces.
     let lost = whole_but_by(&folder, |text| {
         text.lines().filter(|l| !l.starts_with("MeshAlgorithm")).map(|l| l.to_owned() + "\n").collect()
@@ -330,11 +332,9 @@ fn rows_of_long_facets_are_whole() {
 #[test]
 fn where_a_hole_nearly_touches_the_outline_elements_are_small() {
     let out = Out::new();
-    let inputs = tempfile::tempdir().expect("a folder");
-    let path = inputs.path().join("plate.obj");
-    std::fs::write(&path, plate_with_a_hole_near_its_side(96, 0.06)).expect("written");
-    assert_eq!(out.run(&[&path], &["-q", "--size", "1"]).code, Some(0));
-    let report = out.report("plate.obj");
+    let plate = plate_with_a_hole_near_its_side(96, 0.06);
+    let (ended, report) = out.run_bytes_with("plate.obj", plate.as_bytes(), &["-q", "--size", "1"]);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
     assert!(report.hand_off.is_some_and(|h| (1..=16).contains(&h.narrow_places)), "a few places");
     let folder = out.of("plate.obj");
     // The known-bad twin: edges of the same length everywhere.
@@ -366,12 +366,10 @@ fn plate_with_a_hole_near_its_side(n: u32, gap: f64) -> String {
 #[test]
 fn the_tip_of_a_needle_is_kept() {
     let out = Out::new();
-    let inputs = tempfile::tempdir().expect("a folder");
-    let path = inputs.path().join("needle.obj");
-    std::fs::write(&path, needle(40, 16.0)).expect("written");
-    assert_eq!(out.run(&[&path], &["-q"]).code, Some(0));
+    let (ended, report) = out.run_bytes_with("needle.obj", needle(40, 16.0).as_bytes(), &["-q"]);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
     let folder = out.of("needle.obj");
-    assert_eq!(out.report("needle.obj").hand_off.map(|h| h.spikes), Some(3), "one for each halving");
+    assert_eq!(report.hand_off.map(|h| h.spikes), Some(3), "one for each halving");
     // The known-bad twin: edges of the same length everywhere.
     let lost = whole_but_by(&folder, |text| text.replace("Background Field", "// Background Field"));
     assert!(lost.out.contains("a part of the surface is lost") && lost.out.contains("16.0"), "{}", lost.out);

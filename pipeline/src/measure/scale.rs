@@ -34,13 +34,9 @@ const LARGEST: f64 = 960.0;
 pub fn uv_scale(chart: &Chart, map: &PlanarMap) -> f64 {
     // In the unit of the shapes, in which squares of lengths neither vanish nor overflow.
     let in_space: f64 = chart.shapes().iter().map(|shape| shape.area()).sum();
-    let exponent = half_log2(in_space, area_of_corners(map)) - chart.scale().log2();
+    let in_plane = area_of_corners(map);
+    let exponent = (0.5 * (in_space / in_plane).log2()).round() - chart.scale().log2();
     exponent.clamp(-LARGEST, LARGEST).exp2()
-}
-
-/// Half of the binary logarithm of a ratio of areas, rounded to a whole number.
-fn half_log2(in_space: f64, in_plane: f64) -> f64 {
-    (0.5 * (in_space / in_plane).log2()).round()
 }
 
 /// The area of the triangles between the corners in the plane.

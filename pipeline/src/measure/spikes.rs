@@ -6,8 +6,9 @@
 //! same; at the tip of a cone of half-angle a, it is sin a; on a tube of circumference w, 2 w / (pi r) where r is above w.
 //!
 //! The ball has a radius of two edges. Where the share is below 0.6, elements must be smaller, and where it is below 0.5 of a
-//! ball of three edges: those see fingers that are wider. With half the edge length the same is asked again, three times at most. Balls that reach beyond their chart are passed over: meshers
-//! put nodes on every seam, so that nothing is cut off there.
+//! ball of three edges: those see fingers that are wider. With half the edge length the same is asked again, three times at
+//! most. Balls that reach beyond their chart are passed over: meshers put nodes on every seam, so that nothing is cut off
+//! there.
 //!
 //! *It ends.* Each halving looks at each vertex once, and each look at the triangles within a ball; around a vertex that was
 //! looked at, none is within an eighth of a radius, so that a triangle lies in a bounded number of balls (fewer than 300 where

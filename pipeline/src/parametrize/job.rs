@@ -80,13 +80,12 @@ impl Maps {
     fn expected_p99(&self, chart: &Chart) -> f64 {
         let of_nodes =
             |nodes: &[GridPoint]| distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]));
-        let of_start = of_nodes(&self.start);
         match &self.harmonic {
             Some(Ok(map)) => {
                 let of_harmonic = of_nodes(map.nodes());
-                if of_harmonic < f64::MAX { of_harmonic } else { UNTANGLED * of_start }
+                if of_harmonic < f64::MAX { of_harmonic } else { UNTANGLED * of_nodes(&self.start) }
             }
-            Some(Err(_)) | None => of_start,
+            Some(Err(_)) | None => of_nodes(&self.start),
         }
     }
 
@@ -327,13 +326,16 @@ fn freed_where_stretched(
     maps: Maps,
     monitor: &dyn Monitor,
 ) -> Result<Maps, ChartError> {
+    if chart.triangles().len() > FREED {
+        return Ok(maps);
+    }
     let before = maps.expected_p99(chart);
     let (why_none, bearable, gain) = match maps.boundary {
         BoundaryFound::Circle { why_none: Some(why_none) } => (why_none, ROUND, 1.0),
         BoundaryFound::Natural => (NoNatural::Stretched { conformal_p99: before }, UNFOLLOWED, HALVED),
         _ => return Ok(maps),
     };
-    if before <= bearable || chart.triangles().len() > FREED {
+    if before <= bearable {
         return Ok(maps);
     }
     let largest = settings.decompose.max_area_ratio;

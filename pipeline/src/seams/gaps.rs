@@ -206,15 +206,14 @@ impl<'a> Near<'a> {
         }
     }
 
-    /// How far it is from the middle of a piece to another part of the boundary, out of these pieces; infinite where none is
-    /// near.
+    /// How far it is from the middle of a piece to another part of the boundary, out of these pieces; the widest gap where none
+    /// is nearer.
     fn width(&self, piece: &Piece, around: &[u32]) -> f64 {
         let place = piece.middle();
         let mut least = self.widest;
-        let following = |other: &&Piece| other.first == piece.first && piece.between(other.at) < FAR * self.widest;
         for other in around.iter().map(|i| &self.pieces[*i as usize]) {
-            // Most of them are: not worth a closer look.
-            if following(&other) {
+            // Most of them follow on the same loop: not worth a closer look.
+            if other.first == piece.first && piece.between(other.at) < FAR * self.widest {
                 continue;
             }
             let (away, at) = other.nearest(place);

@@ -21,7 +21,8 @@ use planish_core::vec3::BoundingBox;
 ///
 /// `$Entities` holds the boundary representation: a point for every end of a curve, its curves, a
 /// surface per chart. `$Parametrizations` holds the curves as polylines and the charts as triangulations in space
-/// and in the plane, there in their own size ([`LinearChart::uv_scale`]); see docs/gmsh.md for what Gmsh asks of it. Tags are positions plus one.
+/// and in the plane, there in their own size ([`LinearChart::uv_scale`]); see docs/gmsh.md for what Gmsh asks of it.
+/// Tags are positions plus one.
 pub fn atlas(atlas: &CertifiedAtlas, linear: &LinearAtlas) -> Vec<u8> {
     let network = atlas.seams();
     let mut out = Binary::new();
