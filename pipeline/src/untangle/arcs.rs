@@ -50,6 +50,20 @@ pub(super) fn gradient(x: &ArcNodes, k: usize) -> [f64; 8] {
     g
 }
 
+/// The second derivatives of the products, each times its weight, by u of one node and v of another. Those by two u, or
+/// two v, are zero.
+pub(super) fn mixed(weights: &[f64; 3]) -> [[f64; 4]; 4] {
+    let mut mixed = [[0.0; 4]; 4];
+    for ((i, j), weight) in PAIRS.into_iter().zip(weights) {
+        for (n, row) in mixed.iter_mut().enumerate() {
+            for (m, entry) in row.iter_mut().enumerate() {
+                *entry -= weight * (POINTS[i][n] * POINTS[j][m] - POINTS[j][n] * POINTS[i][m]);
+            }
+        }
+    }
+    mixed
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -65,6 +79,10 @@ mod tests {
             assert!((products(&arc_uv(&moved(0.7)))[k] - quadratic).abs() < 1e-14);
             let slope: f64 = (0..8).map(|i| gradient(&x, k)[i] * y[i / 2][i % 2]).sum();
             assert!((slope - polarization(&x, &y)[k]).abs() < 1e-14);
+            // Half of the second derivative along y is what is quadratic.
+            let of_k = mixed(&std::array::from_fn(|l| f64::from(u8::from(l == k))));
+            let second: f64 = (0..16).map(|i| y[i / 4][0] * of_k[i / 4][i % 4] * y[i % 4][1]).sum();
+            assert!((second - products(&y)[k]).abs() < 1e-14);
         }
     }
 }

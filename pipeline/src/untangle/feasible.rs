@@ -1,8 +1,9 @@
 //! The feasible path: a log-barrier method from the degree-elevated linear map.
 
-use super::newton::{Limits, minimise};
+use super::bound::Bound;
+use super::interior::minimise;
 use super::objective::Objective;
-use super::penalty::{Bound, Penalty};
+
 use super::problem::{Cell, Problem};
 use super::{Stats, on_grid, region, uv_of};
 use crate::fem::sparse::Error;
@@ -10,20 +11,6 @@ use crate::grid::GridPoint;
 use crate::map::filled::FilledChart;
 use crate::monitor::Checkpoint;
 use crate::topology::FaceId;
-
-/// The weights of the barrier, relative to the objective of each triangle. The last one decides how close the result
-/// comes: with 55 invalid triangles of 1,076 the energy was 7.7009, 7.4736, 7.4626 and 7.4622 at weights of 1e-4 to 1e-7,
-/// that of the harmonic map 7.4603.
-const WEIGHTS: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-
-/// Newton steps per weight, on large and on small charts, and the triangles times steps that decide between: charts of
-/// CAD parts mostly end at this budget, 0.5 to 38 % above the harmonic energy.
-const STEPS: [usize; 2] = [12, 60];
-const WORK: usize = 120_000;
-
-/// A weight is left when the promised decrease falls below this share of the energy. Far below what the smallest weight
-/// costs.
-const TOLERANCE: f64 = 1e-9;
 
 /// The share of its value in the start that every coefficient keeps. By experience: larger bars more of the valid maps,
 /// smaller leaves less to what rounding to the grid takes.
@@ -89,7 +76,7 @@ fn problem<'a, O: Objective>(
     weights: &Weights,
     checkpoint: &'a Checkpoint,
 ) -> Problem<'a, O> {
-    let unset = |weight: f64| Bound { scale: 1.0, floor: 0.0, weight, dual: None };
+    let unset = |weight: f64| Bound::new(1.0, weight);
     let mut cells = Vec::with_capacity(chart.triangles().len());
     for f in 0..chart.triangles().len() {
         // Fans have energy, and may fold.
@@ -99,13 +86,14 @@ fn problem<'a, O: Objective>(
     }
     let is_outer = chart.outer_nodes();
     let inside = (0..is_outer.len()).filter(|n| !is_outer[*n]);
-    let star_centres = chart.node_count()..chart.node_count() + chart.loops().len();
-    let free: Vec<u32> = inside.chain(star_centres).map(|n| n as u32).collect();
-    let arcs = region::arc_cells(chart, |_| true, unset(weights.mean));
+    let holes: Vec<usize> = (0..chart.loops().len()).collect();
+    let star_centres = holes.iter().map(|k| region::star_centre(chart, *k));
+    let free: Vec<u32> = inside.map(|n| n as u32).chain(star_centres).collect();
+    let arcs = region::arc_cells(chart, &holes, unset(weights.mean));
     Problem::new(chart, objective, cells, arcs, &free, checkpoint)
 }
 
-/// Minimises with falling weights.
+/// Minimises from the start.
 fn descend<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &mut Stats) -> Result<(), Error> {
     if problem.unknowns() == 0 {
         return Ok(());
@@ -113,14 +101,6 @@ fn descend<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &m
     let pattern = problem.pattern();
     problem.checkpoint()?;
     let analysis = pattern.analyse()?;
-    let steps = (WORK / problem.cells.len()).clamp(STEPS[0], STEPS[1]);
-    let limits = Limits { steps, tolerance: TOLERANCE };
-    // Weights are shares of what `weights` found: they are scaled from one to the next.
-    let mut last = 1.0;
-    for weight in WEIGHTS {
-        problem.scale_weights(weight / last);
-        last = weight;
-        stats.add(minimise(problem, &analysis, x, Penalty::Barrier, limits)?);
-    }
+    stats.add(minimise(problem, &analysis, x)?);
     Ok(())
 }

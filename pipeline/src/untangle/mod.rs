@@ -4,28 +4,26 @@
 //! space), under the constraint that every jacobian is positive, with the outer boundary fixed.
 //!
 //! * **Nothing to do** where the harmonic map is valid and every hole can be seen from a point inside.
-//! * **The patch path**, where few triangles are invalid: only a few rings around them move. A regularised penalty
-//!   that accepts an invalid start pulls them over (Garanzha and co-workers 2021, doi 10.1145/3450626.3459847), then
-//!   a log barrier brings the patch back towards the harmonic map. Patches that do not yield grow.
-//! * **The feasible path**: the linear map, degree-elevated, is valid; a log barrier
-//!   method descends from it and never leaves the valid set. All nodes inside move, and a star centre for each hole.
-//! * **The start itself**, if the result of the feasible path does not survive rounding to the grid, or its
+//! * **The patch path**, where few triangles are invalid: only a few rings around them move. Patches that do not yield grow.
+//! * **The feasible path**: the linear map, degree-elevated, is valid, and the method descends from it. All nodes inside
+//!   move, and a star centre for each hole.
+//! * **The start itself**, if the result of the feasible path is not valid, does not survive rounding to the grid, or its
 //!   systems are too large.
 //!
-//! The barrier acts on the six Bernstein coefficients of each jacobian (sufficient for validity), relative to their
-//! size in the start, above a thousandth of it; its weight falls from a tenth to a millionth of the energy. Steps
-//! are Newton's, with dual estimates in the barrier's curvature, from which the concave part is left out; they are
-//! cut short of the nearest floor. Every loop has a fixed limit. As harmonic map, start and result all include the
+//! Both paths use the same primal-dual interior-point method (`interior.rs`): the six Bernstein coefficients of each
+//! jacobian (sufficient for validity) stay above a thousandth of their typical size, by a barrier whose weight falls from a
+//! tenth to a millionth of the energy. Steps are Newton's, with exact curvature. Every loop has a fixed limit. As harmonic
+//! map, start and result all include the
 //! energy of the virtual fans (with free nodes), the harmonic energy is a lower bound of the result's. Where holes are open
 //! (natural boundaries) their loops are as fixed as the outer one, and need no point that sees them.
 
 mod arcs;
+mod bound;
 mod curvature;
 mod feasible;
-mod newton;
+mod interior;
 mod objective;
 mod patch;
-mod penalty;
 mod problem;
 mod region;
 
@@ -108,7 +106,7 @@ struct Stats {
 }
 
 impl Stats {
-    fn add(&mut self, outcome: newton::Outcome) {
+    fn add(&mut self, outcome: interior::Outcome) {
         self.iterations += outcome.iterations;
         self.decrement = outcome.decrement;
     }

@@ -1,16 +1,17 @@
 //! The patch path: only a few rings around invalid triangles move.
 //!
 //! A patch begins between the harmonic map and the feasible start: like the start around the invalid triangles, and
-//! more and more like the harmonic map towards the rim. Begun at the harmonic map itself, triangles with all
-//! vertices on the outer loop come to rest while they are still inverted.
+//! more and more like the harmonic map towards the rim. Mostly that is valid already. Begun at the harmonic map itself,
+//! triangles with all vertices on the outer loop come to rest while they are still inverted.
 
-use super::newton::{Limits, minimise};
+use super::bound::Bound;
+use super::interior::minimise;
 use super::objective::Objective;
-use super::penalty::{Bound, Penalty};
 use super::problem::{Cell, Moved, Problem};
 use super::region;
 use super::{Stats, arc, arcs, centre_of_hole, uv_of};
 use crate::fem::bernstein::{JacobianBezier, Validity};
+use crate::fem::jacobian::CornerDerivatives;
 use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::map::filled::FilledChart;
@@ -20,35 +21,14 @@ use crate::topology::{FaceId, HalfEdgeId, Stars, VertexId};
 
 /// Rings around invalid triangles, one attempt after another. Where the rim of a small patch admits no valid map only a
 /// larger one helps; each costs about twice the one before. Chosen by experience.
-const RINGS: [usize; 5] = [2, 4, 7, 12, 20];
+const RINGS: [usize; 3] = [4, 9, 20];
 
 /// Patches with more triangles than this share of the chart are left to the feasible path: that costs little more then, and
 /// cannot fail.
 const MAX_SHARE: f64 = 0.5;
 
-/// Weight of the regularised penalty, relative to the objective. The heavier the sooner triangles turn over, and the
-/// farther the patch ends from the harmonic map, to which the barrier then has to bring it back. It decides little: half and
-/// twice as much gave the same charts on 18 meshes of up to 19,000 triangles, as many of them by the feasible path, and as
-/// many steps within 1 %.
-const PULL: f64 = 3e-2;
-
-/// The least width of the regularised penalty, relative to a typical jacobian. By experience: narrower is as steep as the
-/// barrier itself, and Newton's steps are short; wider rests before the last triangles have turned over.
-const MIN_WIDTH: f64 = 1e-4;
-
-/// Changes of the regularised penalty's width, and Newton steps for each: few, as the width is to follow the worst
-/// jacobian. Chosen by experience.
-const ROUNDS: usize = 25;
-const STEPS_PER_ROUND: usize = 4;
-
-/// The weights of the barrier that follows, and Newton steps for each. The last one is what keeps the result off the
-/// harmonic map: about its share of the energy.
-const WEIGHTS: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-const STEPS_PER_WEIGHT: usize = 10;
-
-/// A weight is left when the promised decrease falls below this share of the patch's objective. Far below what the smallest
-/// weight costs.
-const TOLERANCE: f64 = 1e-10;
+/// The share of its typical size that every coefficient keeps: what rounding to the grid may take.
+const KEPT: f64 = 1e-3;
 
 /// Why patches do not lead to a valid map.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -120,7 +100,10 @@ pub(super) fn untangle<O: Objective>(
                 Ok(moved) => {
                     for Moved { node, uv } in moved {
                         x[node] = uv;
-                        nodes[node] = node_to_grid(chart, node, uv);
+                        // Star centres are found anew.
+                        if node < nodes.len() {
+                            nodes[node] = node_to_grid(chart, node, uv);
+                        }
                     }
                 }
                 Err(Stuck::Interrupted(interrupted)) => return Err(interrupted.into()),
@@ -234,7 +217,6 @@ impl<'a, O: Objective> PatchContext<'a, O> {
     /// Moves free nodes towards the feasible start, by a share that `weight` gives for each vertex (cut to 0 and 1)
     /// and that mid-edge nodes take from both ends.
     fn blend(&self, x: &mut [[f64; 2]], problem: &Problem<O>, faces: &[FaceId], weight: impl Fn(usize) -> f64) {
-        // Centres of fans stay as they are.
         let is_of_chart = |v: VertexId| v.index() < self.chart.chart_vertices();
         let share = |v: VertexId| if is_of_chart(v) { weight(v.index()).clamp(0.0, 1.0) } else { 0.0 };
         // Per node its share; nodes that triangles have in common come several times, with the same one.
@@ -247,6 +229,14 @@ impl<'a, O: Objective> PatchContext<'a, O> {
                 shares.push((nodes[3 + k], 0.5 * (corner[k] + corner[(k + 1) % 3])));
             }
         }
+        // Centres of holes go as far as their loops do.
+        for (k, hole) in self.chart.loops().iter().enumerate() {
+            let of_loop: f64 = hole.iter().map(|h| share(self.chart.ends(*h)[0])).sum();
+            let mean = of_loop / hole.len() as f64;
+            shares.extend(
+                [self.chart.centre_node(k), region::star_centre(self.chart, k) as usize].map(|node| (node, mean)),
+            );
+        }
         shares.sort_unstable_by_key(|s| s.0);
         for local in problem.free() {
             let n = problem.nodes()[*local as usize] as usize;
@@ -258,64 +248,49 @@ impl<'a, O: Objective> PatchContext<'a, O> {
         }
     }
 
-    /// The problem on a patch: penalties on its triangles and on the arcs of holes in it.
+    /// The problem on a patch: constraints on its triangles, and on the arcs of the holes that it moves.
     fn problem(&self, faces: &[FaceId]) -> Problem<'a, O> {
+        // Such a hole must be seen as a whole, from a point that may move, too.
+        let is_in_patch = |h: &HalfEdgeId| faces.binary_search(&h.face()).is_ok();
+        let is_moved = |k: &usize| self.chart.loops()[*k].iter().any(is_in_patch);
+        let holes: Vec<usize> = (0..self.chart.loops().len()).filter(is_moved).collect();
         let weight = |f: FaceId| self.objective.typical(self.density[f.index()]);
         let mut cells = Vec::with_capacity(faces.len());
         for &face in faces {
-            let bound = Bound { scale: self.density[face.index()], floor: 0.0, weight: weight(face), dual: None };
+            let typical = Bound::new(self.density[face.index()], weight(face));
+            let bounds = if holes.is_empty() {
+                [Bound { floor: KEPT * typical.scale, ..typical }; 6]
+            } else {
+                // Holes are moved inside the valid maps, where the feasible start is to lie.
+                let of_start = CornerDerivatives::new(&self.chart.nodes(face.index()).map(|n| self.start[n])).dets();
+                of_start.map(|det| Bound { floor: KEPT * det.min(typical.scale), ..typical })
+            };
             // Fans have energy, and may fold.
             let is_of_chart = face.index() < self.chart.chart_triangles();
-            cells.push(Cell { face, bounds: is_of_chart.then_some([bound; 6]) });
+            cells.push(Cell { face, bounds: is_of_chart.then_some(bounds) });
         }
         let mean = faces.iter().map(|f| weight(*f)).sum::<f64>() / faces.len() as f64;
-        let unset = Bound { scale: 1.0, floor: 0.0, weight: mean, dual: None };
-        let is_in_patch = |h: HalfEdgeId| faces.binary_search(&h.face()).is_ok();
-        let mut arcs = region::arc_cells(self.chart, is_in_patch, unset);
+        let unset = Bound::new(1.0, mean);
+        let mut arcs = region::arc_cells(self.chart, &holes, unset);
         for arc in &mut arcs {
             // What is typical of an arc is what the feasible start has there.
             let scales = arcs::products(&arc.nodes.map(|n| self.start[n as usize]));
             for (bound, scale) in arc.bounds.iter_mut().zip(scales) {
                 bound.scale = scale;
+                bound.floor = KEPT * scale;
             }
         }
-        let free = region::free_nodes(self.chart, &self.stars, &self.fixed, faces);
+        let mut free = region::free_nodes(self.chart, &self.stars, &self.fixed, faces);
+        free.extend(holes.iter().map(|k| region::star_centre(self.chart, *k)));
         Problem::new(self.chart, self.objective, cells, arcs, &free, self.checkpoint)
     }
 }
 
-/// Pulls a patch over to the valid side, then lets it relax towards the harmonic map.
+/// Lets a patch come to rest.
 fn relax<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &mut Stats) -> Result<(), Stuck> {
     let pattern = problem.pattern();
     problem.checkpoint()?;
     let analysis = pattern.analyse()?;
-    problem.scale_weights(PULL);
-    let mut least = problem.min_ratio(x);
-    let mut eps = f64::INFINITY;
-    let limits = Limits { steps: STEPS_PER_ROUND, tolerance: TOLERANCE };
-    for _ in 0..ROUNDS {
-        if least > 0.0 {
-            break;
-        }
-        // Never wider than the worst jacobian asks for, and narrower from round to round: a penalty that is too
-        // wide comes to rest against the energy while triangles are still inverted. The shares decide little: with 0.3 or
-        // 0.9 in place of 0.6, 18 meshes of up to 19,000 triangles took 2 % more steps, and 159 charts went the feasible path
-        // instead of 158; with 0.1 or 0.4 in place of 0.2, steps were as many within half a percent.
-        eps = (0.6 * eps).min(-0.2 * least).max(MIN_WIDTH);
-        stats.add(minimise(problem, &analysis, x, Penalty::Regularised { eps }, limits)?);
-        least = problem.min_ratio(x);
-    }
-    if least <= 0.0 {
-        return Err(Stuck::Invalid);
-    }
-    // A barrier that the point clears: a thousandth of the typical size, or half of what is there.
-    problem.for_each_bound(x, |c, bound| bound.floor = (1e-3 * bound.scale).min(0.5 * c));
-    let limits = Limits { steps: STEPS_PER_WEIGHT, tolerance: TOLERANCE };
-    let mut last = PULL;
-    for weight in WEIGHTS {
-        problem.scale_weights(weight / last);
-        last = weight;
-        stats.add(minimise(problem, &analysis, x, Penalty::Barrier, limits)?);
-    }
+    stats.add(minimise(problem, &analysis, x)?);
     Ok(())
 }

@@ -1,11 +1,10 @@
-//! The optimisation problem on a region of a chart: an objective plus penalties, over the nodes that may move.
+//! The optimisation problem on a region of a chart: an objective under constraints, over the nodes that may move.
 
-use super::arcs::{self, ArcNodes};
-use super::curvature::add_curvature;
+use super::arcs;
+use super::bound::{Bound, Change};
+use super::curvature::{add_curvature, add_mixed, keep_positive};
 use super::objective::{LocalModel, Objective, SCALARS};
-use super::penalty::{Bound, Penalty, Value};
 use crate::fem::dofs::Dofs;
-use crate::fem::element::P2Nodes;
 use crate::fem::jacobian::CornerDerivatives;
 use crate::fem::sparse::{Analysis, Error, PRESCRIBED, Pattern, Unsolvable};
 use crate::map::filled::FilledChart;
@@ -20,38 +19,90 @@ const WORK_PER_CELL: usize = 4;
 const FIRST_SHIFT: f64 = 1e-12;
 const LAST_SHIFT: f64 = 1e-2;
 
-/// A triangle of the region, with penalties on its six coefficients (none on virtual fans).
+/// A triangle of the region, with constraints on its six coefficients (none on virtual fans).
 pub(super) struct Cell {
     pub face: FaceId,
     pub bounds: Option<[Bound; 6]>,
 }
 
-/// An arc of a hole's loop with its star centre, with penalties on its three products.
+/// An arc of a hole's loop with its star centre, with constraints on its three products.
 pub(super) struct ArcCell {
     pub nodes: [u32; 4],
     pub bounds: [Bound; 3],
 }
 
-/// The part of a chart in which nodes may move, the objective, and the penalties that hold there. Its nodes have
+/// The part of a chart in which nodes may move, the objective, and the constraints that hold there. Its nodes have
 /// numbers of their own, so that a small region costs little, however large the chart is.
 pub(super) struct Problem<'a, O> {
-    chart: &'a FilledChart,
     objective: &'a O,
     checkpoint: &'a Checkpoint<'a>,
-    pub cells: Vec<Cell>,
-    pub arcs: Vec<ArcCell>,
+    cells: Vec<RegionCell>,
+    /// Per arc, its nodes in the numbering of the region.
+    arcs: Vec<[u32; 4]>,
+    /// The constraints: six of each triangle that has some, then three of each arc.
+    bounds: Vec<Bound>,
+    /// Whether slacks are what there is: no step leaves the maps that are valid.
+    is_inside: bool,
     /// The nodes of the region in the numbering of the chart (star centres after all others), ascending.
     nodes: Vec<u32>,
-    /// Per cell, its six nodes in the numbering of the region.
-    of_cell: Vec<[u32; 6]>,
     /// The nodes of the region that may move.
     dofs: Dofs,
 }
 
-/// Slope and curvature of objective and penalties at a point.
+/// A triangle, its nodes in the numbering of the region, and the first of its constraints.
+struct RegionCell {
+    face: FaceId,
+    nodes: [u32; 6],
+    first: Option<usize>,
+}
+
+/// Slope and curvature of objective and constraints at a point.
 pub(super) struct Model {
+    /// The gradient of the condensed system.
     pub gradient: Vec<f64>,
+    /// That of the objective alone.
+    pub energy_gradient: Vec<f64>,
     pub hessian: Vec<f64>,
+}
+
+/// Where a step leads: the changes of all slacks and multipliers, and the slope of the constraints' merit.
+pub(super) struct Course {
+    changes: Vec<Change>,
+    /// Per constraint, its slack and multiplier where it begins.
+    begin: Vec<[f64; 2]>,
+    pub slope: f64,
+}
+
+impl Course {
+    /// The largest share of the step, at most 1, that takes no more than the share `safe` of any slack, or of any multiplier.
+    pub fn longest(&self, safe: f64, of: Of) -> f64 {
+        let share = |(begin, change): (&[f64; 2], &Change)| {
+            let (value, change) = match of {
+                Of::Slacks => (begin[0], change.slack),
+                Of::Multipliers => (begin[1], change.dual),
+            };
+            if change < 0.0 { -safe * value / change } else { 1.0 }
+        };
+        self.begin.iter().zip(&self.changes).map(share).fold(1.0, f64::min)
+    }
+}
+
+/// Slacks, or multipliers.
+#[derive(Clone, Copy)]
+pub(super) enum Of {
+    Slacks,
+    Multipliers,
+}
+
+/// What decides how far a step goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Merit {
+    /// The objective over the region.
+    pub energy: f64,
+    /// What the distances of quantities from their slacks cost.
+    pub distance: f64,
+    /// Both, and the barrier.
+    pub total: f64,
 }
 
 /// A node that moved, in the numbering of the chart, and where it is now.
@@ -68,7 +119,7 @@ impl<'a, O: Objective> Problem<'a, O> {
         chart: &'a FilledChart,
         objective: &'a O,
         cells: Vec<Cell>,
-        mut arcs: Vec<ArcCell>,
+        arcs: Vec<ArcCell>,
         free: &[u32],
         checkpoint: &'a Checkpoint,
     ) -> Self {
@@ -79,12 +130,17 @@ impl<'a, O: Objective> Problem<'a, O> {
         nodes.dedup();
         // From the numbering of the chart to that of the region: the position among all nodes of the region.
         let local = |n: u32| nodes.partition_point(|m| *m < n) as u32;
-        let of_cell = cells.iter().map(|c| in_chart(c).map(local)).collect();
-        for arc in &mut arcs {
-            arc.nodes = arc.nodes.map(local);
+        let mut bounds = Vec::with_capacity(6 * cells.len() + 3 * arcs.len());
+        let mut of_region = Vec::with_capacity(cells.len());
+        for cell in &cells {
+            let first = cell.bounds.is_some().then_some(bounds.len());
+            bounds.extend(cell.bounds.iter().flatten());
+            of_region.push(RegionCell { face: cell.face, nodes: in_chart(cell).map(local), first });
         }
+        bounds.extend(arcs.iter().flat_map(|arc| arc.bounds));
+        let arcs = arcs.iter().map(|arc| arc.nodes.map(local)).collect();
         let dofs = Dofs::new(nodes.len(), free.iter().map(|n| local(*n)).collect());
-        Self { chart, objective, checkpoint, cells, arcs, nodes, of_cell, dofs }
+        Self { objective, checkpoint, cells: of_region, arcs, bounds, is_inside: false, nodes, dofs }
     }
 
     /// A safe point, after all triangles of the region were looked at.
@@ -119,8 +175,8 @@ impl<'a, O: Objective> Problem<'a, O> {
 
     /// The pattern of the Hessian: first the triangles, then the arcs (padded to the same size).
     pub fn pattern(&self) -> Pattern {
-        let of_cells = self.of_cell.iter().map(|nodes| self.components(nodes));
-        let of_arcs = self.arcs.iter().map(|arc| self.components(&arc.nodes));
+        let of_cells = self.cells.iter().map(|cell| self.components(&cell.nodes));
+        let of_arcs = self.arcs.iter().map(|arc| self.components(arc));
         let elements: Vec<[u32; SCALARS]> = of_cells.chain(of_arcs).collect();
         Pattern::new(self.unknowns(), &elements)
     }
@@ -131,59 +187,76 @@ impl<'a, O: Objective> Problem<'a, O> {
         std::array::from_fn(component)
     }
 
-    /// The objective over the region plus all penalties.
-    pub fn value(&self, x: &[[f64; 2]], penalty: Penalty) -> f64 {
-        let mut total = 0.0;
-        for (i, cell) in self.cells.iter().enumerate() {
-            let uv = self.cell_uv(i, x);
-            total += self.objective.value(cell.face, &uv);
-            if let Some(bounds) = &cell.bounds {
-                let dets = CornerDerivatives::new(&uv).dets();
-                total += (0..6).map(|k| penalty.at(dets[k], &bounds[k]).value).sum::<f64>();
-            }
-        }
-        for arc in &self.arcs {
-            let products = arcs::products(&arc_uv(arc, x));
-            total += (0..3).map(|k| penalty.at(products[k], &arc.bounds[k]).value).sum::<f64>();
-        }
-        total
+    /// The objective over the region.
+    fn energy(&self, x: &[[f64; 2]]) -> f64 {
+        self.cells.iter().map(|cell| self.objective.value(cell.face, &at(x, &cell.nodes))).sum()
     }
 
-    fn cell_uv(&self, cell: usize, x: &[[f64; 2]]) -> P2Nodes {
-        self.of_cell[cell].map(|n| x[n as usize])
+    /// All quantities that are constrained, in the order of the constraints.
+    fn quantities(&self, x: &[[f64; 2]]) -> Vec<f64> {
+        let mut all = Vec::with_capacity(self.bounds.len());
+        for cell in self.cells.iter().filter(|cell| cell.first.is_some()) {
+            all.extend(CornerDerivatives::new(&at(x, &cell.nodes)).dets());
+        }
+        all.extend(self.arcs.iter().flat_map(|arc| arcs::products(&at(x, arc))));
+        all
+    }
+
+    /// What is linear in t in the quantities of `x + t direction`.
+    fn slopes(&self, x: &[[f64; 2]], direction: &[[f64; 2]]) -> Vec<f64> {
+        let mut all = Vec::with_capacity(self.bounds.len());
+        for cell in self.cells.iter().filter(|cell| cell.first.is_some()) {
+            let [from, along] = [x, direction].map(|p| CornerDerivatives::new(&at(p, &cell.nodes)));
+            all.extend(from.polarization(&along));
+        }
+        all.extend(self.arcs.iter().flat_map(|arc| arcs::polarization(&at(x, arc), &at(direction, arc))));
+        all
+    }
+
+    /// Sets all slacks and multipliers for the map `x`. Where loops of holes are to be seen from a point, and are, no step is to
+    /// leave the valid maps: small holes turn around it in a step, and never back. Where they are not yet, they have no choice.
+    pub fn begin(&mut self, x: &[[f64; 2]]) {
+        let quantities = self.quantities(x);
+        let mut slacks = self.bounds.iter().zip(&quantities).map(|(bound, c)| c - bound.floor);
+        self.is_inside = !self.arcs.is_empty() && slacks.all(|slack| slack > 0.0);
+        for (bound, c) in self.bounds.iter_mut().zip(quantities) {
+            if self.is_inside { bound.begin_with(c - bound.floor) } else { bound.begin(c) }
+        }
     }
 
     /// Gradient and (positive) Hessian at `x`.
-    pub fn model(&self, x: &[[f64; 2]], penalty: Penalty, pattern: &Pattern) -> Model {
-        let mut model = Model { gradient: vec![0.0; self.unknowns()], hessian: pattern.zeros() };
+    pub fn model(&self, x: &[[f64; 2]], pattern: &Pattern) -> Model {
+        let zeros = vec![0.0; self.unknowns()];
+        let mut model = Model { gradient: zeros.clone(), energy_gradient: zeros, hessian: pattern.zeros() };
         for (i, cell) in self.cells.iter().enumerate() {
-            let uv = self.cell_uv(i, x);
+            let uv = at(x, &cell.nodes);
             let mut local = self.objective.model(cell.face, &uv);
-            if let Some(bounds) = &cell.bounds {
+            self.scatter(&mut model.energy_gradient, &cell.nodes, &local.gradient);
+            if let Some(first) = cell.first {
                 let corners = CornerDerivatives::new(&uv);
-                let dets = corners.dets();
-                let values: [Value; 6] = std::array::from_fn(|k| penalty.at(dets[k], &bounds[k]));
-                let shape = &self.chart.shapes()[cell.face.index()];
-                // Two parts: the curvature of the coefficients, and that of the penalty along their gradients.
-                add_curvature(&mut local.hessian, shape, &values.map(|v| v.multiplier));
-                for (k, value) in values.iter().enumerate() {
-                    add_outer(&mut local, value, &corners.gradient(k));
+                let (dets, bounds) = (corners.dets(), &self.bounds[first..first + 6]);
+                // Two parts: the curvature of the coefficients, and that of the constraints along their gradients.
+                add_curvature(&mut local.hessian, &std::array::from_fn(|k| bounds[k].dual));
+                for (k, bound) in bounds.iter().enumerate() {
+                    add_outer(&mut local, bound, dets[k], &corners.gradient(k));
                 }
+                keep_positive(&mut local.hessian);
             }
             pattern.add(&mut model.hessian, i, &local.hessian);
-            self.scatter(&mut model.gradient, &self.of_cell[i], &local.gradient);
+            self.scatter(&mut model.gradient, &cell.nodes, &local.gradient);
         }
+        let first_of_arcs = self.bounds.len() - 3 * self.arcs.len();
         for (i, arc) in self.arcs.iter().enumerate() {
-            let uv = arc_uv(arc, x);
-            let products = arcs::products(&uv);
+            let uv = at(x, arc);
+            let (products, bounds) = (arcs::products(&uv), &self.bounds[first_of_arcs + 3 * i..][..3]);
             let mut local = LocalModel { gradient: [0.0; SCALARS], hessian: [[0.0; SCALARS]; SCALARS] };
-            // The curvature of the products themselves is left out.
-            for k in 0..3 {
-                let value = penalty.at(products[k], &arc.bounds[k]);
-                add_outer(&mut local, &value, &padded(arcs::gradient(&uv, k)));
+            add_mixed(&mut local.hessian, &arcs::mixed(&std::array::from_fn(|k| -bounds[k].dual)));
+            for (k, bound) in bounds.iter().enumerate() {
+                add_outer(&mut local, bound, products[k], &padded(arcs::gradient(&uv, k)));
             }
+            keep_positive(&mut local.hessian);
             pattern.add(&mut model.hessian, self.cells.len() + i, &local.hessian);
-            self.scatter(&mut model.gradient, &arc.nodes, &local.gradient);
+            self.scatter(&mut model.gradient, arc, &local.gradient);
         }
         model
     }
@@ -206,82 +279,59 @@ impl<'a, O: Objective> Problem<'a, O> {
         direction
     }
 
-    /// The largest t at which no penalised quantity of `x + t direction` has fallen to its floor yet.
-    pub fn longest_step(&self, x: &[[f64; 2]], direction: &[[f64; 2]]) -> f64 {
-        // Every penalised quantity is quadratic in the nodes, and so is it along a line: c0 + c1 t + c2 t^2.
-        let mut longest = f64::INFINITY;
-        for (i, cell) in self.cells.iter().enumerate() {
-            let Some(bounds) = &cell.bounds else { continue };
-            let at = CornerDerivatives::new(&self.cell_uv(i, x));
-            let along = CornerDerivatives::new(&self.cell_uv(i, direction));
-            let (c0, c1, c2) = (at.dets(), at.polarization(&along), along.dets());
-            for k in 0..6 {
-                longest = longest.min(first_zero(c0[k] - bounds[k].floor, c1[k], c2[k]));
-            }
+    /// Where a step leads from `x`; what distances cost is raised where it must be.
+    pub fn course(&mut self, x: &[[f64; 2]], direction: &[[f64; 2]]) -> Course {
+        let (quantities, slopes) = (self.quantities(x), self.slopes(x, direction));
+        let mut course = Course { changes: vec![], begin: vec![], slope: 0.0 };
+        for (bound, (c, slope)) in self.bounds.iter_mut().zip(quantities.into_iter().zip(slopes)) {
+            let change = bound.change(c, slope);
+            bound.raise_cost(&change);
+            course.slope += bound.slope(c, &change);
+            course.begin.push([bound.slack, bound.dual]);
+            course.changes.push(change);
         }
-        for arc in &self.arcs {
-            let at = arc_uv(arc, x);
-            let along = arc_uv(arc, direction);
-            let (c0, c1, c2) = (arcs::products(&at), arcs::polarization(&at, &along), arcs::products(&along));
-            for k in 0..3 {
-                longest = longest.min(first_zero(c0[k] - arc.bounds[k].floor, c1[k], c2[k]));
-            }
-        }
-        longest
+        course
     }
 
-    /// Calls `visit` with every penalised quantity and its bound.
+    /// The constraints after these shares of the changes of slacks and multipliers, which brought the map to `x`; none where it
+    /// left the valid maps and must not.
+    pub fn moved_bounds(&self, x: &[[f64; 2]], course: &Course, share: f64, of_dual: f64) -> Option<Vec<Bound>> {
+        let quantities = self.quantities(x);
+        let moved = |((bound, change), c): ((&Bound, &Change), f64)| {
+            if self.is_inside {
+                bound.moved_inside(c, change, of_dual)
+            } else {
+                Some(bound.moved(c, change, share, of_dual))
+            }
+        };
+        self.bounds.iter().zip(&course.changes).zip(quantities).map(moved).collect()
+    }
+
+    /// Takes other slacks and multipliers over.
+    pub fn set_bounds(&mut self, bounds: Vec<Bound>) {
+        self.bounds = bounds;
+    }
+
+    /// The merit of `x` with these constraints; their own where none are given.
+    pub fn merit(&self, x: &[[f64; 2]], bounds: Option<&[Bound]>) -> Merit {
+        let bounds = bounds.unwrap_or(&self.bounds);
+        let (energy, mut distance, mut total) = (self.energy(x), 0.0, 0.0);
+        for (bound, c) in bounds.iter().zip(self.quantities(x)) {
+            distance += bound.cost * bound.residual(c).abs();
+            total += bound.merit(c);
+        }
+        Merit { energy, distance, total: energy + total }
+    }
+
+    /// Calls `visit` with every constrained quantity and its constraint.
     pub fn for_each_bound(&mut self, x: &[[f64; 2]], mut visit: impl FnMut(f64, &mut Bound)) {
-        for i in 0..self.cells.len() {
-            let dets = CornerDerivatives::new(&self.cell_uv(i, x)).dets();
-            for (det, bound) in dets.iter().zip(self.cells[i].bounds.iter_mut().flatten()) {
-                visit(*det, bound);
-            }
-        }
-        for arc in &mut self.arcs {
-            let products = arcs::products(&arc_uv(arc, x));
-            for (product, bound) in products.iter().zip(&mut arc.bounds) {
-                visit(*product, bound);
-            }
-        }
+        let quantities = self.quantities(x);
+        self.bounds.iter_mut().zip(quantities).for_each(|(bound, c)| visit(c, bound));
     }
 
-    /// Updates the dual variables of a barrier after the step from `from` to `to`, of which `direction` is the full
-    /// length.
-    pub fn update_duals(&mut self, from: &[[f64; 2]], direction: &[[f64; 2]], to: &[[f64; 2]]) {
-        for i in 0..self.cells.len() {
-            if self.cells[i].bounds.is_none() {
-                continue;
-            }
-            let [x, d, y] = [from, direction, to].map(|p| CornerDerivatives::new(&self.cell_uv(i, p)));
-            let (old, change, new) = (x.dets(), x.polarization(&d), y.dets());
-            for (k, bound) in self.cells[i].bounds.iter_mut().flatten().enumerate() {
-                bound.update_dual(old[k], change[k], new[k]);
-            }
-        }
-        for arc in &mut self.arcs {
-            let [x, d, y] = [from, direction, to].map(|p| arc_uv(arc, p));
-            let (old, change, new) = (arcs::products(&x), arcs::polarization(&x, &d), arcs::products(&y));
-            for (k, bound) in arc.bounds.iter_mut().enumerate() {
-                bound.update_dual(old[k], change[k], new[k]);
-            }
-        }
-    }
-
-    /// The least penalised quantity, relative to its scale.
-    pub fn min_ratio(&mut self, x: &[[f64; 2]]) -> f64 {
-        let mut least = f64::INFINITY;
-        self.for_each_bound(x, |c, bound| least = least.min((c - bound.floor) / bound.scale));
-        least
-    }
-
-    /// Scales the weights of all penalties.
+    /// Scales the weights of all constraints.
     pub fn scale_weights(&mut self, factor: f64) {
-        let of_cells = self.cells.iter_mut().filter_map(|c| c.bounds.as_mut()).flatten();
-        let of_arcs = self.arcs.iter_mut().flat_map(|a| &mut a.bounds);
-        for bound in of_cells.chain(of_arcs) {
-            bound.weight *= factor;
-        }
+        self.bounds.iter_mut().for_each(|bound| bound.weight *= factor);
     }
 
     /// Newton's step: minus the inverse Hessian times the gradient. Where rounding makes the Hessian singular its
@@ -308,49 +358,22 @@ impl<'a, O: Objective> Problem<'a, O> {
     }
 }
 
-fn arc_uv(arc: &ArcCell, x: &[[f64; 2]]) -> ArcNodes {
-    arc.nodes.map(|n| x[n as usize])
+/// The uv of some nodes.
+fn at<const N: usize>(x: &[[f64; 2]], nodes: &[u32; N]) -> [[f64; 2]; N] {
+    nodes.map(|n| x[n as usize])
 }
 
 fn padded(g: [f64; 8]) -> [f64; SCALARS] {
     std::array::from_fn(|i| if i < 8 { g[i] } else { 0.0 })
 }
 
-/// Adds slope and curvature of a penalty on a quantity with this gradient.
-fn add_outer(local: &mut LocalModel, value: &Value, gradient: &[f64; SCALARS]) {
+/// Adds slope and curvature of a constraint on the quantity `c` with this gradient.
+fn add_outer(local: &mut LocalModel, bound: &Bound, c: f64, gradient: &[f64; SCALARS]) {
+    let condensed = bound.condensed(c);
     for i in 0..SCALARS {
-        local.gradient[i] -= value.neg_derivative * gradient[i];
+        local.gradient[i] -= condensed.pull * gradient[i];
         for j in 0..=i {
-            local.hessian[i][j] += value.second_derivative * gradient[i] * gradient[j];
+            local.hessian[i][j] += condensed.stiffness * gradient[i] * gradient[j];
         }
-    }
-}
-
-/// The least t > 0 at which c0 + c1 t + c2 t^2 falls to zero, where c0 > 0; infinity where it never does.
-fn first_zero(c0: f64, c1: f64, c2: f64) -> f64 {
-    let discriminant = c1 * c1 - 4.0 * c0 * c2;
-    if c2 > 0.0 && (c1 >= 0.0 || discriminant < 0.0) {
-        return f64::INFINITY;
-    }
-    // The form of the root that does not cancel where c1 < 0.
-    let root = discriminant.max(0.0).sqrt();
-    let t = if c1 <= 0.0 { 2.0 * c0 / (root - c1) } else { -(c1 + root) / (2.0 * c2) };
-    // Negative where c2 = 0 < c1: what only grows never falls to zero.
-    if t > 0.0 { t } else { f64::INFINITY }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn zeros_are_found_on_both_branches() {
-        assert_eq!(first_zero(1.0, -1.0, 0.0), 1.0);
-        assert_eq!(first_zero(2.0, -3.0, 1.0), 1.0);
-        assert_eq!(first_zero(2.0, 1.0, -1.0), 2.0);
-        assert_eq!(first_zero(1.0, -1.0, 1.0), f64::INFINITY);
-        assert_eq!(first_zero(1.0, 1.0, 1.0), f64::INFINITY);
-        assert_eq!(first_zero(1.0, 1.0, 0.0), f64::INFINITY);
-        assert_eq!(first_zero(1.0, 0.0, -4.0), 0.5);
     }
 }

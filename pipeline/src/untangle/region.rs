@@ -1,6 +1,6 @@
 //! Regions of a chart: rings around triangles, and what may move inside.
 
-use super::penalty::Bound;
+use super::bound::Bound;
 use super::problem::ArcCell;
 use crate::map::filled::FilledChart;
 use crate::topology::union_find::UnionFind;
@@ -94,13 +94,17 @@ pub(super) fn free_nodes(chart: &FilledChart, stars: &Stars, fixed: &[bool], fac
     free
 }
 
-/// The arcs of all holes whose half-edges `wanted` picks, with their star centres, all with the bound `unset`.
-pub(super) fn arc_cells(chart: &FilledChart, wanted: impl Fn(HalfEdgeId) -> bool, unset: Bound) -> Vec<ArcCell> {
+/// The node at the star centre of a hole: these are numbered after all nodes of the chart.
+pub(super) fn star_centre(chart: &FilledChart, hole: usize) -> u32 {
+    (chart.node_count() + hole) as u32
+}
+
+/// All arcs of `holes`, with their star centres, all with the bound `unset`.
+pub(super) fn arc_cells(chart: &FilledChart, holes: &[usize], unset: Bound) -> Vec<ArcCell> {
     let mut cells = Vec::new();
-    for (k, hole) in chart.loops().iter().enumerate() {
-        // Star centres are numbered after all nodes of the chart.
-        let centre = (chart.node_count() + k) as u32;
-        for h in hole.iter().copied().filter(|h| wanted(*h)) {
+    for k in holes {
+        let centre = star_centre(chart, *k);
+        for h in chart.loops()[*k].iter().copied() {
             let [from, to] = chart.ends(h).map(|v| chart.vertex_node(v) as u32);
             let nodes = [from, chart.mid_node(h) as u32, to, centre];
             cells.push(ArcCell { nodes, bounds: [unset; 3] });
