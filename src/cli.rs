@@ -1,7 +1,7 @@
 //! The command line.
 
 use crate::settings::{
-    Boundary, ExportTarget, FeatureAngle, Inputs, Log, RawSettings, Refused, Settings, SettingsError,
+    Boundary, ExportTarget, FeatureAngle, Inputs, Log, RawSettings, Refine, Refused, Settings, SettingsError,
 };
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
@@ -143,6 +143,10 @@ pub struct Making {
     /// and scales areas evenly, else the circle; or the circle for all [default: natural]
     #[arg(long, value_enum, value_name = "SHAPE")]
     pub boundary: Option<Boundary>,
+    /// Bisect triangles where the quadratic map of a chart is too poor, to at most N times as many per chart; off: none are
+    /// [default: 4]. The surface does not change, and triangles tell which one of the input they are part of
+    #[arg(long, value_name = "N|off")]
+    pub refine: Option<Refine>,
     /// Meshers to which results are handed: gmsh writes atlas.msh and remesh.geo [default: gmsh]
     #[arg(long, value_enum, value_name = "MESHER")]
     pub hand_off: Option<ExportTarget>,
@@ -329,6 +333,7 @@ impl Making {
             out: self.out.clone(),
             order: self.order,
             boundary: self.boundary,
+            refine: self.refine,
             weld: self.reading.weld,
             feature_angle: self.feature_angle,
             strict_disks: self.strict_disks.then_some(true),

@@ -14,7 +14,9 @@ use planish_core::map::linear;
 use planish_core::mesh::{SurfaceMesh, TriangleSoup};
 use planish_core::monitor::{Interrupted, Monitor, NoMonitor};
 use planish_core::repair::{self, Accepted, Repaired, repair};
-use planish_core::{CertifiedAtlas, CertifiedChart, ChartError, ChartJob, Error, MapError, MappedChart, Plan};
+use planish_core::{
+    CertifiedAtlas, CertifiedChart, ChartError, ChartJob, Error, MapError, MappedChart, Plan, Surveyed,
+};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// The files of a result: names and contents.
@@ -98,6 +100,26 @@ fn internal(fault: impl std::fmt::Display) -> Reason {
     Reason::new(Code::Internal, format!("{fault}: that is a fault of planish; please report it with the file"))
 }
 
+/// Maps a chart for a first time, and finds where it needs more triangles.
+///
+/// # Errors
+/// As [`map`].
+pub fn survey(job: ChartJob, monitor: &dyn Monitor) -> Result<Surveyed, Abort> {
+    job.survey(monitor).map_err(not_mapped)
+}
+
+/// Refines a surface where its charts need it, and cuts chart jobs from it.
+///
+/// # Errors
+/// A fault of planish.
+pub fn refine(
+    mesh: SurfaceMesh,
+    surveyed: Vec<Surveyed>,
+) -> Result<(SurfaceMesh, Vec<ChartJob>, report::Refinement), Abort> {
+    let (mesh, jobs, done) = planish_core::refine(mesh, surveyed).map_err(internal)?;
+    Ok((mesh, jobs, done.into()))
+}
+
 /// Maps a chart, splitting it where it must be.
 ///
 /// # Errors
@@ -169,7 +191,7 @@ pub fn finish(input: Input, found: Repaired, atlas: Atlas, settings: &Settings) 
     let of_charts = settings.core().of_charts();
     let mut done = Vec::new();
     for chart in atlas.into_charts() {
-        done.extend(ChartJob { chart, settings: of_charts }.run(&NoMonitor).map_err(not_mapped)?);
+        done.extend(ChartJob::new(chart, of_charts).run(&NoMonitor).map_err(not_mapped)?);
     }
     let (certified, files) = assemble(found.mesh, done, whole, settings, &NoMonitor)?;
     Ok((facts.certified(settings, certified), files))

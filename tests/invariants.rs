@@ -19,7 +19,7 @@ fn charts(soup: &TriangleSoup) -> Vec<CertifiedChart> {
     let atlas = decompose::decompose(&mesh, &decompose, &NoMonitor).expect("an atlas");
     let mut all = Vec::new();
     for chart in atlas.into_charts() {
-        all.extend(ChartJob { chart, settings }.run(&NoMonitor).expect("maps"));
+        all.extend(ChartJob::new(chart, settings).run(&NoMonitor).expect("maps"));
     }
     for certified in &all {
         let ratio = certified.distortion().area_ratio;

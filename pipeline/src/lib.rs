@@ -71,6 +71,7 @@ pub mod measure;
 pub mod mesh;
 pub mod monitor;
 pub mod parametrize;
+mod refine;
 pub mod repair;
 pub mod seams;
 mod settings;
@@ -83,7 +84,10 @@ pub mod vec3;
 
 pub use certified::{CertifiedAtlas, CertifiedChart};
 pub use decompose::decompose;
-pub use parametrize::{ChartError, ChartJob, Error, MapError, MappedChart, Plan, parametrize, parametrize_surface};
+pub use parametrize::{
+    ChartError, ChartJob, Error, MapError, MappedChart, Plan, Refinement, Surveyed, parametrize, parametrize_surface,
+    refine,
+};
 pub use repair::repair;
 pub use settings::{BoundaryShape, ChartSettings, Order, OutOfRange, Settings};
 pub use subdivide::subdivide;

@@ -22,7 +22,7 @@ pub enum Order {
 /// let mut settings = Settings { order: Order::Linear, ..Settings::default() };
 /// settings.decompose.max_area_ratio = 1e3;
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The order of the elements.
     pub order: Order,
@@ -30,11 +30,23 @@ pub struct Settings {
     pub repair: repair::Settings,
     /// What charts must respect.
     pub decompose: decompose::Settings,
+    /// How many times as many triangles a chart may get where its quadratic map is too poor; none: no triangle is bisected.
+    pub refine: Option<u32>,
     /// The length of edges, in the unit of the input, of a mesh that is to be made through the atlas; none: that of the
     /// input (see [`crate::mesh::SurfaceMesh::default_size`]). It decides which corners of the shape are ends of curves:
     /// of those that are nearer together than three quarters of it, one. Maps do not depend on it. Finite, positive.
     pub size: Option<f64>,
 }
+
+impl Default for Settings {
+    fn default() -> Self {
+        let ChartSettings { order, decompose, refine } = ChartSettings::default();
+        Self { order, repair: repair::Settings::default(), decompose, refine, size: None }
+    }
+}
+
+/// How many times as many triangles a chart may get, unless another number is asked for.
+const REFINE: u32 = 4;
 
 /// A setting is out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -76,17 +88,25 @@ impl Settings {
 
     /// What the maps of charts depend on.
     pub fn of_charts(&self) -> ChartSettings {
-        ChartSettings { order: self.order, decompose: self.decompose }
+        ChartSettings { order: self.order, decompose: self.decompose, refine: self.refine }
     }
 }
 
 /// What the map of a chart depends on.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChartSettings {
     /// The order of the elements.
     pub order: Order,
     /// What charts must respect: one that does not is split.
     pub decompose: decompose::Settings,
+    /// As in [`Settings`].
+    pub refine: Option<u32>,
+}
+
+impl Default for ChartSettings {
+    fn default() -> Self {
+        Self { order: Order::default(), decompose: decompose::Settings::default(), refine: Some(REFINE) }
+    }
 }
 
 impl ChartSettings {
@@ -98,6 +118,7 @@ impl ChartSettings {
         let decompose::Settings { max_area_ratio, max_triangles, feature_angle, .. } = self.decompose;
         refuse_unless(max_area_ratio >= 10.0, "max_area_ratio", max_area_ratio, "at least 10")?;
         refuse_unless(max_triangles >= 1, "max_triangles", max_triangles as f64, "at least 1")?;
+        refuse_unless(self.refine != Some(0), "refine", 0.0, "at least 1, or off")?;
         let angle = feature_angle.unwrap_or(90.0);
         refuse_unless(angle > 0.0 && angle < 180.0, "feature_angle", angle, "between 0 and 180 degrees")
     }

@@ -1,5 +1,5 @@
 //! The stages, on threads of their own, and the bounded channels between them:
-//! **read -> decompose -> map -> untangle -> write**, and behind them the commands that run on results.
+//! **read -> decompose -> refine -> map -> untangle -> write**, and behind them the commands that run on results.
 //!
 //! What travels before mapping and after it is a chart, not a file: the charts of one large input keep all processors
 //! busy, and so do many small inputs. Rules that keep it moving:
@@ -47,7 +47,7 @@ use in_flight::{InFlight, Shared};
 use parking_lot::RwLock;
 use planish_core::mesh::TriangleSoup;
 use planish_core::monitor::Monitor;
-use planish_core::{CertifiedChart, ChartJob, MappedChart, Plan};
+use planish_core::{CertifiedChart, ChartJob, MappedChart, Plan, Surveyed};
 use progress::{Progress, Running};
 use queue::Queue;
 use reading::Next;
@@ -141,6 +141,7 @@ impl Conveyor {
         // What is large waits before it is read, not behind that: one soup, and `--jobs` charts, per lane.
         let (soups, to_cut) = bounded(1);
         let (apart, to_do_apart) = bounded(1);
+        let (cut_out, to_survey) = bounded(jobs);
         let (charts, to_map) = bounded(jobs);
         let (mapped, to_untangle) = bounded(jobs);
         let (finished, to_write) = bounded(jobs);
@@ -156,7 +157,9 @@ impl Conveyor {
             self.stage("apart", jobs, to_do_apart, move |one| do_apart(one, &refused, &after))?;
         }
         let refused = finished.clone();
-        self.stage("decompose", jobs, to_cut, move |soup| cut(soup, &charts, &refused))?;
+        self.stage("decompose", jobs, to_cut, move |soup| cut(soup, &cut_out, &refused))?;
+        let refused = finished.clone();
+        self.stage("refine", jobs, to_survey, move |chart| survey(chart, &charts, &refused))?;
         let refused = finished.clone();
         self.stage("map", jobs, to_map, move |chart| map(chart, &mapped, &refused))?;
         self.stage("untangle", jobs, to_untangle, move |mapped| untangle(mapped, &finished))?;
@@ -265,16 +268,23 @@ struct Soup {
     soup: TriangleSoup,
 }
 
+/// What refinement gets.
+struct Uncharted {
+    surface: Arc<Surface<Surveyed>>,
+    index: usize,
+    job: ChartJob,
+}
+
 /// What mapping gets.
 struct Cut {
-    surface: Arc<Surface>,
+    surface: Arc<Surface<Vec<CertifiedChart>>>,
     part_index: PartIndex,
     job: ChartJob,
 }
 
 /// What untangling gets.
 struct Mapped {
-    surface: Arc<Surface>,
+    surface: Arc<Surface<Vec<CertifiedChart>>>,
     part_index: PartIndex,
     mapped: MappedChart,
 }
@@ -282,7 +292,7 @@ struct Mapped {
 /// What writing gets.
 enum Finished {
     /// All charts are in, or one stopped the job.
-    Surface(Arc<Surface>),
+    Surface(Arc<Surface<Vec<CertifiedChart>>>),
     /// There are no charts.
     Abort(Arc<InFlight>, Box<Facts>, Abort),
 }
@@ -299,7 +309,7 @@ fn hand_on<T>(to: &Sender<T>, item: T) {
     let _ = to.send(item);
 }
 
-fn cut(Soup { in_flight, mut facts, soup }: Soup, charts: &Sender<Cut>, finished: &Sender<Finished>) {
+fn cut(Soup { in_flight, mut facts, soup }: Soup, charts: &Sender<Uncharted>, finished: &Sender<Finished>) {
     let cut = in_flight.compute(Stage::Decompose, |monitor| {
         let found = stages::repaired(&soup, &in_flight.settings)?;
         // The surface is all that is needed from here on.
@@ -318,8 +328,38 @@ fn cut(Soup { in_flight, mut facts, soup }: Soup, charts: &Sender<Cut>, finished
     match cut {
         Err(why) => hand_on(finished, Finished::Abort(in_flight, Box::new(facts), why)),
         Ok(Plan { mesh, jobs, .. }) => {
-            let surface = Surface::new(in_flight, mesh, jobs.len(), facts);
+            let surface = Surface::new(in_flight, mesh, jobs.len(), jobs.len(), facts);
             // The stages behind work on the first charts while the last ones wait here for room in the channel.
+            for (index, job) in jobs.into_iter().enumerate() {
+                hand_on(charts, Uncharted { surface: surface.clone(), index, job });
+            }
+        }
+    }
+}
+
+/// Looks at a chart; behind the last one of a surface, refines that, and sends its charts on.
+fn survey(Uncharted { surface, index, job }: Uncharted, charts: &Sender<Cut>, finished: &Sender<Finished>) {
+    let in_flight = surface.in_flight.clone();
+    let work = |monitor: &dyn Monitor| stages::survey(job, monitor);
+    let part_index = (index, 0);
+    let found = if surface.is_pending(part_index) { in_flight.compute(Stage::Map, work) } else { Err(Abort::Unwanted) };
+    if !surface.complete_part(part_index, found) {
+        return;
+    }
+    let (mut facts, surveyed) = surface.collect();
+    let refined = surveyed.and_then(|(mesh, surveyed)| {
+        in_flight.compute(Stage::Refine, |_| {
+            let (mesh, jobs, done) = stages::refine(mesh, surveyed)?;
+            if let Some(surface) = &mut facts.surface {
+                surface.refinement = Some(done);
+            }
+            Ok((mesh, jobs))
+        })
+    });
+    match refined {
+        Err(why) => hand_on(finished, Finished::Abort(in_flight, Box::new(facts), why)),
+        Ok((mesh, jobs)) => {
+            let surface = Surface::new(in_flight, mesh, surface.whole, jobs.len(), facts);
             for (i, job) in jobs.into_iter().enumerate() {
                 hand_on(charts, Cut { surface: surface.clone(), part_index: (i, 0), job });
             }
@@ -352,11 +392,13 @@ fn untangle(Mapped { surface, part_index, mapped }: Mapped, finished: &Sender<Fi
 }
 
 fn complete_part(
-    surface: Arc<Surface>,
+    surface: Arc<Surface<Vec<CertifiedChart>>>,
     part_index: PartIndex,
     part: Result<Vec<CertifiedChart>, Abort>,
     finished: &Sender<Finished>,
 ) {
+    let in_flight = &surface.in_flight;
+    in_flight.shared.progress.update(in_flight.number, |job| job.charts_done += 1);
     if surface.complete_part(part_index, part) {
         hand_on(finished, Finished::Surface(surface));
     }

@@ -10,7 +10,9 @@ pub enum Stage {
     Read,
     /// Repair and decomposition.
     Decompose,
-    /// Linear and harmonic maps.
+    /// Bisecting triangles where the first maps are too poor.
+    Refine,
+    /// Linear and harmonic maps, the first ones too.
     Map,
     /// Untangling and proving.
     Untangle,
@@ -22,7 +24,8 @@ pub enum Stage {
 
 impl Stage {
     /// All stages, in their order.
-    const ALL: [Self; 6] = [Self::Read, Self::Decompose, Self::Map, Self::Untangle, Self::Write, Self::Chain];
+    const ALL: [Self; 7] =
+        [Self::Read, Self::Decompose, Self::Refine, Self::Map, Self::Untangle, Self::Write, Self::Chain];
 
     /// The stage of this name.
     pub fn of(name: &str) -> Option<Self> {
@@ -34,6 +37,7 @@ impl Stage {
         match self {
             Self::Read => "read",
             Self::Decompose => "decompose",
+            Self::Refine => "refine",
             Self::Map => "map",
             Self::Untangle => "untangle",
             Self::Write => "write",

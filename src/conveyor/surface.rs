@@ -1,10 +1,9 @@
-//! A surface whose charts are on their way: they are put together when the last one is in.
+//! A surface whose charts are on their way through a stage: they come together again when the last one is in.
 
 use super::in_flight::InFlight;
 use crate::outcome::Abort;
 use crate::report::Facts;
 use parking_lot::Mutex;
-use planish_core::CertifiedChart;
 use planish_core::mesh::SurfaceMesh;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,27 +11,27 @@ use std::sync::Arc;
 /// The place of a part among the others: that of its chart, and which part of it.
 pub(super) type PartIndex = (usize, usize);
 
-/// A surface that was cut into charts.
-pub(super) struct Surface {
+/// A surface that was cut into charts, of each of which something becomes.
+pub(super) struct Surface<T> {
     pub in_flight: Arc<InFlight>,
     /// How many charts decomposition made.
     pub whole: usize,
-    parts: Mutex<Parts>,
+    parts: Mutex<Parts<T>>,
 }
 
-struct Parts {
+struct Parts<T> {
     mesh: Option<SurfaceMesh>,
     facts: Facts,
     missing: usize,
-    done: BTreeMap<PartIndex, Vec<CertifiedChart>>,
+    done: BTreeMap<PartIndex, T>,
     stopped: Option<(PartIndex, Abort)>,
 }
 
-impl Surface {
-    /// A surface of which no chart is mapped yet.
-    pub fn new(in_flight: Arc<InFlight>, mesh: SurfaceMesh, whole: usize, facts: Facts) -> Arc<Self> {
-        in_flight.shared.progress.update(in_flight.number, |job| job.charts = whole);
-        let parts = Parts { mesh: Some(mesh), facts, missing: whole, done: BTreeMap::new(), stopped: None };
+impl<T> Surface<T> {
+    /// A surface of which no chart is done yet; `missing` of them are on their way, of which decomposition made `whole`.
+    pub fn new(in_flight: Arc<InFlight>, mesh: SurfaceMesh, whole: usize, missing: usize, facts: Facts) -> Arc<Self> {
+        in_flight.shared.progress.update(in_flight.number, |job| job.charts = missing);
+        let parts = Parts { mesh: Some(mesh), facts, missing, done: BTreeMap::new(), stopped: None };
         Arc::new(Self { in_flight, whole, parts: Mutex::new(parts) })
     }
 
@@ -49,11 +48,10 @@ impl Surface {
     }
 
     /// A part is done, or stopped. Whether it was the last one.
-    pub fn complete_part(&self, part_index: PartIndex, part: Result<Vec<CertifiedChart>, Abort>) -> bool {
-        self.in_flight.shared.progress.update(self.in_flight.number, |job| job.charts_done += 1);
+    pub fn complete_part(&self, part_index: PartIndex, part: Result<T, Abort>) -> bool {
         let mut parts = self.parts.lock();
         match part {
-            Ok(charts) => drop(parts.done.insert(part_index, charts)),
+            Ok(done) => drop(parts.done.insert(part_index, done)),
             Err(why) if parts.stopped.as_ref().is_none_or(|(stopped, _)| part_index < *stopped) => {
                 parts.stopped = Some((part_index, why));
             }
@@ -63,10 +61,10 @@ impl Surface {
         parts.missing == 0
     }
 
-    /// What is known so far, and the surface with all charts in order, or why there are not all. Once: nothing is left here.
-    pub fn collect(&self) -> (Facts, Result<(SurfaceMesh, Vec<CertifiedChart>), Abort>) {
+    /// What is known so far, and the surface with what became of all charts in order, or why there are not all. Once: nothing is left here.
+    pub fn collect(&self) -> (Facts, Result<(SurfaceMesh, Vec<T>), Abort>) {
         let mut parts = self.parts.lock();
-        let done = std::mem::take(&mut parts.done).into_values().flatten().collect();
+        let done = std::mem::take(&mut parts.done).into_values().collect();
         let collected = match (parts.stopped.take(), parts.mesh.take()) {
             (None, Some(mesh)) => Ok((mesh, done)),
             (Some((_, why)), _) => Err(why),
@@ -93,11 +91,11 @@ mod tests {
         for turn in 0..3 {
             let mesh = repair(&shapes::disk(2), &Default::default()).expect("a surface").mesh;
             let input = Input { name: "a.stl".to_owned(), bytes: None, blake3: None, beside: vec![] };
-            let surface = Surface::new(begin(&shared), mesh, 3, Facts::new(input));
+            let surface = Surface::new(begin(&shared), mesh, 3, 3, Facts::new(input));
             surface.expect(1);
             let mut order = part_indices;
             order.rotate_left(turn);
-            assert!(!surface.complete_part((0, 0), Ok(vec![])));
+            assert!(!surface.complete_part((0, 0), Ok(())));
             let last: Vec<bool> = order.iter().map(|p| surface.complete_part(*p, Err(refusal(*p)))).collect();
             assert_eq!(last, [false, false, true]);
             assert!(surface.is_pending((0, 0)) && !surface.is_pending((0, 2)));

@@ -52,6 +52,8 @@ pub fn repairs(report: &repair::Report) -> Repairs {
         ("duplicate_triangles", &report.duplicate_triangles),
         ("degenerate_triangles", &report.degenerate_triangles),
         ("flipped_triangles", &report.flipped_triangles),
+        ("needles_collapsed", &report.needles_collapsed),
+        ("caps_flipped", &report.caps_flipped),
         ("split_vertices", &report.split_vertices),
         ("mollified_triangles", &report.mollified_triangles),
     ];
@@ -67,6 +69,9 @@ pub fn repairs(report: &repair::Report) -> Repairs {
         duplicate_triangles: report.duplicate_triangles.count,
         degenerate_triangles: report.degenerate_triangles.count,
         flipped_triangles: report.flipped_triangles.count,
+        needles_collapsed: report.needles_collapsed.count,
+        caps_flipped: report.caps_flipped.count,
+        slivers_moved_by: report.slivers_moved_by,
         split_vertices: report.split_vertices.count,
         mollified_triangles: report.mollified_triangles.count,
         mollified_by: report.mollified_by,

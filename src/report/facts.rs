@@ -2,7 +2,8 @@
 //! the end. So a report never holds what a stage that broke down has left behind.
 
 use super::{
-    ChartReport, Decomposition, ExportReport, Input, Output, RefusedComponent, Repairs, Report, Seams, Surface, Warning,
+    ChartReport, Decomposition, ExportReport, Input, Output, Refinement, RefusedComponent, Repairs, Report, Seams,
+    Surface, Warning,
 };
 use crate::formats::Notes;
 use crate::outcome::{Reason, Status};
@@ -33,6 +34,8 @@ pub struct SurfaceFacts {
     pub refused: Vec<RefusedComponent>,
     /// How it was cut into charts; none where it was not.
     pub decomposition: Option<Decomposition>,
+    /// What was refined; none where that was not looked at.
+    pub refinement: Option<Refinement>,
 }
 
 /// What is known of an atlas.
@@ -59,6 +62,7 @@ impl SurfaceFacts {
             warnings: super::warnings(found),
             refused: vec![],
             decomposition: None,
+            refinement: None,
         }
     }
 }
@@ -72,7 +76,7 @@ impl Facts {
     /// The report of an input for which there are no maps yet: all that is known, and no result.
     pub fn report(self, settings: &Settings) -> Report {
         let report = Report { content: self.content, ..Report::new(self.input, settings) };
-        let Some(SurfaceFacts { surface, repairs, warnings, refused, decomposition }) = self.surface else {
+        let Some(SurfaceFacts { surface, repairs, warnings, refused, decomposition, refinement }) = self.surface else {
             return report;
         };
         Report {
@@ -81,6 +85,7 @@ impl Facts {
             warnings,
             refused_components: refused,
             decomposition,
+            refinement,
             ..report
         }
     }
@@ -99,6 +104,7 @@ impl Facts {
         if let Some(surface) = &mut self.surface {
             // How many charts there would have been is not known to its end.
             surface.decomposition = None;
+            surface.refinement = None;
         }
         Report { status: reason.status(), reason: Some(reason), ..self.report(settings) }
     }

@@ -51,6 +51,9 @@ pub struct Report {
     pub warnings: Vec<Warning>,
     /// How the surface was cut into charts.
     pub decomposition: Option<Decomposition>,
+    /// What was refined; null where no map was tried.
+    #[serde(default)]
+    pub refinement: Option<Refinement>,
     /// The charts.
     pub charts: Vec<ChartReport>,
     /// The curves between charts.
@@ -85,6 +88,10 @@ pub struct ResultSettings {
     /// Boundary of charts in the plane; none in results of older versions, which are out of date.
     #[serde(default)]
     pub boundary: Option<settings::Boundary>,
+    /// How many times as many triangles a chart may get; null: none are bisected. 0 in results of older versions, which are out
+    /// of date.
+    #[serde(default = "older")]
+    pub refine: Option<u32>,
     /// Tolerance for cracks.
     pub weld: f64,
     /// Dihedral angle of feature edges, in degrees; null: off.
@@ -101,11 +108,17 @@ pub struct ResultSettings {
     pub size: Option<f64>,
 }
 
+/// What no settings say.
+fn older() -> Option<u32> {
+    Some(0)
+}
+
 impl From<&Settings> for ResultSettings {
     fn from(settings: &Settings) -> Self {
         Self {
             order: if settings.order == Order::Linear { 1 } else { 2 },
             boundary: Some(settings.boundary),
+            refine: settings.refine,
             weld: settings.weld,
             feature_angle: settings.feature_angle,
             strict_disks: settings.strict_disks,
@@ -123,6 +136,7 @@ impl ResultSettings {
         Settings {
             order: if self.order == 1 { Order::Linear } else { Order::Quadratic },
             boundary: self.boundary.unwrap_or(settings.boundary),
+            refine: self.refine,
             weld: self.weld,
             feature_angle: self.feature_angle,
             strict_disks: self.strict_disks,
@@ -217,6 +231,15 @@ pub struct Repairs {
     pub degenerate_triangles: usize,
     /// Triangles turned over.
     pub flipped_triangles: usize,
+    /// Triangles narrower than the tolerance, removed: an edge was collapsed.
+    #[serde(default)]
+    pub needles_collapsed: usize,
+    /// Triangles narrower than the tolerance, removed: the longest edge was flipped.
+    #[serde(default)]
+    pub caps_flipped: usize,
+    /// The farthest that a point of the surface moved with these, in the unit of the input.
+    #[serde(default)]
+    pub slivers_moved_by: f64,
     /// Vertices given to several sheets.
     pub split_vertices: usize,
     /// Triangles whose area mollification changed by more than 1 %.
@@ -236,6 +259,38 @@ pub struct Decomposition {
     pub ears_split: usize,
     /// How many of the charts came from splitting others that were too distorted or could not be mapped.
     pub charts_by_splitting: usize,
+}
+
+/// Which triangles were bisected, because the quadratic map was too poor there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Refinement {
+    /// Charts of which triangles were bisected because their maps ask for it.
+    pub charts: usize,
+    /// Triangles before.
+    pub triangles_before: usize,
+    /// Triangles after.
+    pub triangles_after: usize,
+    /// How many of those that were added no map asked for: they are there so that no node hangs.
+    pub by_closure: usize,
+    /// The first few triangles for which maps ask for it.
+    pub places: Vec<RefinedPlace>,
+}
+
+/// A triangle that was bisected.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RefinedPlace {
+    /// Its position in the input.
+    pub triangle: u32,
+    /// The centroid of a part of it.
+    pub at: [f64; 3],
+}
+
+impl From<planish_core::Refinement> for Refinement {
+    fn from(done: planish_core::Refinement) -> Self {
+        let planish_core::Refinement { charts, triangles_before, triangles_after, by_closure, places } = done;
+        let places = places.into_iter().map(|(triangle, at)| RefinedPlace { triangle, at }).collect();
+        Self { charts, triangles_before, triangles_after, by_closure, places }
+    }
 }
 
 /// A component that was refused.
@@ -540,6 +595,7 @@ impl Report {
             repairs: None,
             warnings: vec![],
             decomposition: None,
+            refinement: None,
             charts: vec![],
             seams: Seams::default(),
             hand_off: None,

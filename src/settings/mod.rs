@@ -15,7 +15,7 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 pub use template::{Part, Placeholder, Template, TemplateError};
-pub use values::{Boundary, ExportTarget, FeatureAngle, Inputs, Log, Off, RawCommand, RawLimits, Refused};
+pub use values::{Boundary, ExportTarget, FeatureAngle, Inputs, Log, Off, RawCommand, RawLimits, Refine, Refused};
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
 /// the file alone.
@@ -28,6 +28,8 @@ pub struct RawSettings {
     pub order: Option<u8>,
     /// Boundary of charts in the plane.
     pub boundary: Option<Boundary>,
+    /// How many times as many triangles a chart may get where its map needs them, or `off`.
+    pub refine: Option<Refine>,
     /// Tolerance for cracks, relative to the diagonal of the bounding box.
     pub weld: Option<f64>,
     /// Dihedral angle of feature edges, in degrees, or `off`.
@@ -102,6 +104,8 @@ pub struct Settings {
     pub order: Order,
     /// Boundary of charts in the plane.
     pub boundary: Boundary,
+    /// How many times as many triangles a chart may get where its map needs them; none: it gets none.
+    pub refine: Option<u32>,
     /// Tolerance for cracks, relative to the diagonal of the bounding box.
     pub weld: f64,
     /// Dihedral angle of feature edges, in degrees; none: there are none.
@@ -173,6 +177,7 @@ impl Settings {
                 strict_disks: self.strict_disks,
                 feature_angle: self.feature_angle,
             },
+            refine: self.refine,
             size: self.size,
         }
     }
@@ -184,6 +189,9 @@ pub enum SettingsError {
     /// The order is not 1 or 2.
     #[error("order is {0}; it must be 1 (linear) or 2 (quadratic)")]
     Order(u8),
+    /// No triangle may stay, or there would be no end.
+    #[error("refine is {0}; it must lie between 1 and {MOST_REFINED}, or be off")]
+    Refine(u32),
     /// The tolerance is out of range.
     #[error("weld is {0}; it must lie between 0 (close no cracks) and 0.01 of the bounding box's diagonal")]
     Weld(f64),
@@ -248,6 +256,9 @@ pub enum SettingsError {
 /// More computations at once than this are a slip of the finger.
 const MOST_JOBS: usize = 1024;
 
+/// More triangles for each of the input than this are one, too.
+const MOST_REFINED: u32 = 1000;
+
 /// More commands at once than this are one, too.
 const MOST_COMMANDS: usize = 2 * MOST_JOBS;
 
@@ -298,6 +309,7 @@ impl RawSettings {
             out: self.out.or(other.out),
             order: self.order.or(other.order),
             boundary: self.boundary.or(other.boundary),
+            refine: self.refine.or(other.refine),
             weld: self.weld.or(other.weld),
             feature_angle: self.feature_angle.or(other.feature_angle),
             strict_disks: self.strict_disks.or(other.strict_disks),
@@ -354,6 +366,10 @@ impl RawSettings {
             2 => Order::Quadratic,
             other => return Err(SettingsError::Order(other)),
         };
+        let refine = self.refine.map_or(planish_core::Settings::default().refine, Refine::times);
+        if let Some(times) = refine.filter(|times| !(1..=MOST_REFINED).contains(times)) {
+            return Err(SettingsError::Refine(times));
+        }
         let weld = self.weld.unwrap_or(planish_core::repair::Settings::default().weld);
         // A range holds no number that is none: NaN is refused here, and below.
         if !(0.0..=0.01).contains(&weld) {
@@ -403,6 +419,7 @@ impl RawSettings {
             out: self.out,
             order,
             boundary,
+            refine,
             weld,
             feature_angle,
             strict_disks: self.strict_disks.unwrap_or(core.strict_disks),

@@ -57,6 +57,33 @@ pub enum FeatureAngle {
     Off(Off),
 }
 
+/// How far charts may be refined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(untagged)]
+pub enum Refine {
+    /// To so many times as many triangles.
+    Times(u32),
+    /// Not at all.
+    Off(Off),
+}
+
+impl Refine {
+    pub(super) fn times(self) -> Option<u32> {
+        if let Self::Times(times) = self { Some(times) } else { None }
+    }
+}
+
+impl std::str::FromStr for Refine {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "off" {
+            return Ok(Self::Off(Off::Off));
+        }
+        text.parse().map(Self::Times).map_err(|_| format!("{text} is neither a whole number nor off"))
+    }
+}
+
 /// The word `off`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]

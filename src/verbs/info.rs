@@ -139,6 +139,8 @@ fn repairs(r: &Repairs) -> Vec<String> {
         (r.duplicate_triangles, "duplicate triangles removed"),
         (r.degenerate_triangles, "degenerate triangles removed"),
         (r.flipped_triangles, "triangles flipped"),
+        (r.needles_collapsed, "needles collapsed"),
+        (r.caps_flipped, "caps flipped"),
         (r.split_vertices, "vertices split"),
         (r.mollified_triangles, "triangles mollified"),
     ];

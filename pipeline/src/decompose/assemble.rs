@@ -35,6 +35,17 @@ pub fn assemble(mesh: &SurfaceMesh, labels: &[u32]) -> Result<Atlas, Illegal> {
     Ok(Atlas { charts: charts.collect::<Result<_, _>>()?, feature_edges: 0 })
 }
 
+/// The chart, numbered `id`, with that loop as the outer one on which the vertex `on_outer` of the surface lies: of loops that
+/// are as long, rounding would choose.
+pub(crate) fn with_outer(mut chart: Chart, id: ChartId, on_outer: VertexId) -> Chart {
+    let is_outer = |l: &Vec<HalfEdgeId>| l.iter().any(|h| chart.vertices[chart.from(*h).index()] == on_outer);
+    if let Some(hole) = chart.holes.iter().position(is_outer) {
+        std::mem::swap(&mut chart.outer, &mut chart.holes[hole]);
+    }
+    chart.id = id;
+    chart
+}
+
 /// What a face or a vertex of the surface is in a chart.
 #[derive(Clone, Copy)]
 struct Local {

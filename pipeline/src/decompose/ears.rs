@@ -4,9 +4,9 @@
 //! the third edge is shorter than the two; where the surface itself ends in one, its *inner* edge is split in the
 //! middle and joined to the ear's tip and to the vertex on the other side. The surface does not change.
 
-use super::assemble::assemble;
+use super::assemble::{assemble, with_outer};
 use super::legality::Illegal;
-use crate::atlas::Atlas;
+use crate::atlas::{Atlas, Chart};
 use crate::mesh::{MeshEditor, SurfaceMesh};
 use crate::topology::{FaceId, HalfEdgeId};
 
@@ -56,13 +56,8 @@ pub fn split_ears(mesh: &SurfaceMesh, atlas: &Atlas, max_triangles: usize) -> Re
         return Ok(None);
     }
     let mut split = assemble(&mesh, &work.labels)?;
-    for (new, old) in split.charts.iter_mut().zip(atlas.charts()) {
-        let on_outer = old.vertices[old.from(old.outer[0]).index()];
-        let is_outer = |l: &Vec<HalfEdgeId>| l.iter().any(|h| new.vertices[new.from(*h).index()] == on_outer);
-        if let Some(hole) = new.holes.iter().position(is_outer) {
-            std::mem::swap(&mut new.outer, &mut new.holes[hole]);
-        }
-    }
+    let like = |(new, old): (Chart, &Chart)| with_outer(new, old.id, old.vertices[old.from(old.outer[0]).index()]);
+    split.charts = split.charts.into_iter().zip(atlas.charts()).map(like).collect();
     split.feature_edges = atlas.feature_edges;
     Ok(Some(WithoutEars { mesh, atlas: split, split: work.split }))
 }

@@ -48,6 +48,7 @@ use crate::mesh::SurfaceMesh;
 use crate::monitor::{Interrupted, Monitor};
 use crate::topology::HalfEdgeId;
 pub use assemble::assemble;
+pub(crate) use assemble::with_outer;
 pub use boundary_shape::BoundaryShape;
 use complex::Complex;
 use dual::Dual;
@@ -61,6 +62,7 @@ use predict::CellGraph;
 use search::Search;
 use selection::Selection;
 use split::legal;
+pub(crate) use split::part_of;
 pub use split::{contact, halve, separate, split};
 use voronoi::{Cells, bisect_until};
 

@@ -4,6 +4,7 @@
 //! the region below some scale is a short way across it. Otherwise the chart is cut into two parts of about the same
 //! size. A chart is planar, so two connected parts of it are charts wherever neither touches itself.
 
+use super::assemble::assemble;
 use super::complex::Complex;
 use super::dual::Dual;
 use super::features::with_features;
@@ -130,6 +131,21 @@ pub fn contact(chart: &Chart) -> Option<[VertexId; 2]> {
     copies.sort_unstable();
     let twice = copies.windows(2).find(|w| w[0].0 == w[1].0)?;
     Some([VertexId(twice[0].1), VertexId(twice[1].1)])
+}
+
+/// The chart of some triangles of `chart`, ascending, with the same id; none where they form none.
+pub(crate) fn part_of(chart: &Chart, faces: &[FaceId]) -> Option<Chart> {
+    let surface = chart.to_surface().restricted(faces);
+    let piece = assemble(&surface, &vec![0; faces.len()]).ok()?.into_charts().pop()?;
+    let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| chart.triangles[f.index()]).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    Some(Chart {
+        id: chart.id,
+        vertices: vertices.iter().map(|v| chart.vertices[v.index()]).collect(),
+        faces: faces.iter().map(|f| chart.faces[f.index()]).collect(),
+        ..piece
+    })
 }
 
 /// The charts into which `cut` labels the triangles of `chart`, with straightened seams.

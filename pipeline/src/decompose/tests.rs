@@ -128,7 +128,7 @@ fn what_stretches_too_much_is_split_until_it_does_not() {
         let whole = assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk");
         let chart = whole.into_charts().remove(0);
         let settings = ChartSettings { decompose: settings, ..ChartSettings::default() };
-        let parts = ChartJob { chart, settings }.map(&NoMonitor).expect("maps");
+        let parts = ChartJob::new(chart, settings).map(&NoMonitor).expect("maps");
         assert!(parts.len() > 2, "{}", parts.len());
         let triangles = parts.iter().map(|p| p.chart().triangles().len());
         assert_eq!(triangles.sum::<usize>(), mesh.triangles().len());

@@ -86,17 +86,10 @@ impl MeshEditor {
     /// The two parts of the triangle at `h` when `middle` halves that side.
     fn halves(&self, h: HalfEdgeId, middle: VertexId) -> [Part; 2] {
         let corners = self.mesh.triangles[h.face().index()];
-        let lengths = self.mesh.metric.shapes[h.face().index()].lengths;
         let [k, l, m] = [h.side(), h.next().side(), h.prev().side()];
         let [p, q, r] = [corners[k], corners[l], corners[m]];
-        let [pq, qr, rp] = [lengths[k], lengths[l], lengths[m]];
-        // Apollonius: the median from r.
-        let median = (0.5 * (qr * qr + rp * rp) - 0.25 * pq * pq).max(0.0).sqrt();
-        let half = 0.5 * pq;
-        [
-            ([p, middle, r], TriangleShape { lengths: [half, median, rp] }),
-            ([middle, q, r], TriangleShape { lengths: [half, qr, median] }),
-        ]
+        let [first, second] = self.mesh.metric.shapes[h.face().index()].halves(k);
+        [([p, middle, r], first), ([middle, q, r], second)]
     }
 
     fn from(&self, h: HalfEdgeId) -> VertexId {

@@ -38,6 +38,16 @@ impl TriangleShape {
         Self { lengths: [distance(p[0], p[1]), distance(p[1], p[2]), distance(p[2], p[0])] }
     }
 
+    /// The longest of the edges 01, 12, 20: 0, 1 or 2; of those that are as long, the one that comes first.
+    pub fn longest_side(&self) -> usize {
+        (1..3).fold(0, |longest, k| if self.lengths[k] > self.lengths[longest] { k } else { longest })
+    }
+
+    /// The length of the longest edge.
+    pub fn longest(&self) -> f64 {
+        self.lengths[self.longest_side()]
+    }
+
     /// By how much the worst triangle inequality holds (negative: it does not).
     pub fn slack(&self) -> f64 {
         let [a, b, c] = sorted(self.lengths);
@@ -75,6 +85,16 @@ impl TriangleShape {
         let corner = [a + c - b, a + b - c, b + c - a];
         let radius = 4.0 * self.area() / (a + b + c);
         corner.map(|t| radius / t)
+    }
+
+    /// The two parts when `side` (0, 1, 2 for the edges 01, 12, 20) is halved and joined to the corner across: that at the
+    /// begin of the side with the edges half side, median, third edge, and that at its end with half side, next edge, median.
+    pub fn halves(&self, side: usize) -> [Self; 2] {
+        let [pq, qr, rp] = [0, 1, 2].map(|k| self.lengths[(side + k) % 3]);
+        // Apollonius: the median from the corner across.
+        let median = (0.5 * (qr * qr + rp * rp) - 0.25 * pq * pq).max(0.0).sqrt();
+        let half = 0.5 * pq;
+        [Self { lengths: [half, median, rp] }, Self { lengths: [half, qr, median] }]
     }
 
     /// The corners in the plane: corner 0 at the origin, corner 1 on the positive x axis, corner 2 above it.

@@ -1,5 +1,6 @@
 //! Surfaces: from a soup of triangles to a mesh with edges, orientation and intrinsic lengths.
 
+mod bisect;
 mod edit;
 mod intrinsic;
 mod outlier;
@@ -7,6 +8,7 @@ mod soup;
 mod steps;
 mod surface;
 
+pub(crate) use bisect::{Halved, Ranks, falls_to_nothing, halve};
 pub(crate) use edit::MeshEditor;
 pub use intrinsic::{Metric, TriangleShape};
 pub use outlier::ValueApart;

@@ -33,6 +33,8 @@ pub struct SurfaceMesh {
     pub(super) welded: Vec<u32>,
     /// Vertices from this one on are not of the input.
     pub(super) added_from: usize,
+    /// How many triangles refinement added.
+    pub(super) by_refinement: usize,
     pub(super) edges: EdgeTable,
     pub(super) summary: TopologySummary,
     pub(super) metric: Metric,
@@ -81,7 +83,7 @@ impl SurfaceMesh {
         let counted = counted.unwrap_or_else(|| TopologySummary::new(&triangles, &edges));
         let Sheets { nonmanifold_edges, nonmanifold_vertices } = sheets;
         let summary = TopologySummary { nonmanifold_edges, nonmanifold_vertices, ..counted };
-        Self { points, triangles, source, welded, added_from, edges, summary, metric }
+        Self { points, triangles, source, welded, added_from, by_refinement: 0, edges, summary, metric }
     }
 
     /// Checks what the surface knows of itself against what its triangles tell.
@@ -194,7 +196,7 @@ impl SurfaceMesh {
     pub(crate) fn of_patch(triangles: Vec<[VertexId; 3]>, edges: EdgeTable, metric: Metric, patch: Patch) -> Self {
         let Patch { points, welded, source, added_from, .. } = patch;
         let summary = TopologySummary::new(&triangles, &edges);
-        Self { points, triangles, source, welded, added_from, edges, summary, metric }
+        Self { points, triangles, source, welded, added_from, by_refinement: 0, edges, summary, metric }
     }
 
     /// The total true area, in the unit of the input, squared.
@@ -205,11 +207,16 @@ impl SurfaceMesh {
         (0..self.triangles.len()).map(scaled).sum::<f64>() / scale / scale
     }
 
+    /// The same surface, to which refinement added so many of its triangles.
+    pub(crate) fn refined_by(self, triangles: usize) -> Self {
+        Self { by_refinement: triangles, ..self }
+    }
+
     /// The length of edges of a mesh like this one, in the unit of the input: that of as many equilateral triangles of the
-    /// same area, but at most a fiftieth of the diagonal of the bounding box.
+    /// same area, but at most a fiftieth of the diagonal of the bounding box. What refinement added does not count.
     pub fn default_size(&self) -> f64 {
         let coarsest = self.bounding_box().diagonal() / EDGES_PER_DIAGONAL;
-        let share = self.area() / self.triangles.len() as f64;
+        let share = self.area() / (self.triangles.len() - self.by_refinement) as f64;
         let edge = (share * 4.0 / 3.0_f64.sqrt()).sqrt();
         if edge > 0.0 { edge.min(coarsest) } else { coarsest }
     }

@@ -8,7 +8,7 @@
 //! Cutting is no end in itself: more charts mean more curves on which the nodes of a mesh are bound to lie. A cut is
 //! tried, and taken only where all parts suit a mesher and are few.
 
-use super::job::{ChartError, MapError, Maps, map_whole};
+use super::job::{ChartError, MapError, Maps, map_whole, natural_maps};
 use crate::atlas::Chart;
 use crate::certified::BoundaryFound;
 use crate::decompose;
@@ -16,6 +16,8 @@ use crate::map::natural;
 use crate::measure::distortion;
 use crate::monitor::{Interrupted, Monitor};
 use crate::settings::{BoundaryShape, ChartSettings};
+use crate::topology::FaceId;
+use std::collections::BTreeMap;
 
 /// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
 /// of a terrain, at 10 to 50, and soccerball_g31, at 80, are well left whole.
@@ -41,7 +43,7 @@ const FEW: usize = 3;
 /// The same for those that are torn. What was needed: 53 for three holes by menger_sponge3, whose long facets join
 /// across its openings, and 37 for four by the inside of imu_adis16480. A ring of fine triangles that falls into more
 /// (bent_disk) had better stay whole.
-const MANY: usize = 20;
+const MANY: usize = 100;
 
 /// A ring whose map scales areas by no more than this stays one chart: of a cylinder's wall that is e^(2 L / R), for walls
 /// up to one radius high.
@@ -54,6 +56,12 @@ const ROUND: f64 = 2.0;
 /// What is unrolled has no larger conformal distortion, and no larger area ratio: a quarter of a cylinder of eight facets
 /// has neither.
 const UNROLLED: f64 = 1.1;
+
+/// Parts of no more triangles than this are joined to neighbours, where that can be.
+const SMALL: usize = 64;
+
+/// What the map of two joined parts may stretch.
+const JOINED: f64 = 3.0;
 
 /// A chart and its map.
 type Mapped = (Chart, Maps);
@@ -105,7 +113,7 @@ impl Cutter<'_> {
             if let Some((parts, naturals)) = self.parts_within(chart, map, bound, most)?
                 && (bound == GOOD || naturals > 0)
             {
-                return Ok(Some(parts));
+                return Ok(Some(self.joined(chart, parts)?));
             }
         }
         Ok(None)
@@ -114,7 +122,7 @@ impl Cutter<'_> {
     /// The two strips into which a ring falls, where both are unrolled without stretching, as the wall of a cylinder is; none
     /// where natural boundaries were not asked for, or the ring has one that suits it.
     fn strips(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Mapped>>, ChartError> {
-        let ChartSettings { order, ref decompose } = *self.settings;
+        let ChartSettings { order, ref decompose, .. } = *self.settings;
         if decompose.boundary == BoundaryShape::Circle || chart.holes().len() != 1 {
             return Ok(None);
         }
@@ -192,12 +200,53 @@ impl Cutter<'_> {
         Ok(Some((done, naturals)))
     }
 
+    /// Joins small parts of `chart` to neighbours as long as the map of both together suits a mesher: needles make cuts
+    /// that leave single triangles, and meshers need an element for each of their corners. Every join leaves fewer parts.
+    fn joined(&self, chart: &Chart, parts: Vec<Mapped>) -> Result<Vec<Mapped>, ChartError> {
+        let local = |face: &FaceId| chart.faces().partition_point(|f| f < face);
+        let mut parts: Vec<Option<Mapped>> = parts.into_iter().map(Some).collect();
+        let mut owner = vec![0; chart.faces().len()];
+        for (k, part) in parts.iter().enumerate() {
+            part.iter().flat_map(|(chart, _)| chart.faces()).for_each(|f| owner[local(f)] = k);
+        }
+        let mut waiting: Vec<usize> = (0..parts.len()).collect();
+        let size = |parts: &[Option<Mapped>], k: usize| parts[k].as_ref().map_or(0, |(c, _)| c.triangles().len());
+        // The last one is the smallest.
+        waiting.sort_by_key(|k| std::cmp::Reverse(size(&parts, *k)));
+        while let Some(k) = waiting.pop() {
+            if size(&parts, k) == 0 || size(&parts, k) > SMALL {
+                continue;
+            }
+            for other in neighbours(chart, &owner, k) {
+                if let Some(joined) = self.join(chart, &owner, [k, other])? {
+                    owner.iter_mut().filter(|o| **o == other).for_each(|o| *o = k);
+                    parts[other] = None;
+                    parts[k] = Some(joined);
+                    waiting.push(k);
+                    break;
+                }
+            }
+        }
+        Ok(parts.into_iter().flatten().collect())
+    }
+
+    /// Two parts of `chart` as one, if its map suits a mesher.
+    fn join(&self, chart: &Chart, owner: &[usize], pair: [usize; 2]) -> Result<Option<Mapped>, ChartError> {
+        let faces: Vec<FaceId> = (0..owner.len()).filter(|f| pair.contains(&owner[*f])).map(FaceId::at).collect();
+        let Some(both) = decompose::part_of(chart, &faces).filter(|both| decompose::contact(both).is_none()) else {
+            return Ok(None);
+        };
+        let map = natural_maps(&both, self.settings.order, self.monitor)?;
+        let suits = |map: &Maps| map.conformal_p99(&both) <= JOINED && map.invalid_share(&both) <= TANGLED;
+        Ok(map.filter(suits).map(|map| (both, map)))
+    }
+
     /// Maps a chart, or splits it once where it touches itself in space, cannot be mapped, or would be too distorted.
     ///
     /// # Errors
     /// [`ChartError`].
     pub(super) fn attempt(&self, chart: &Chart) -> Result<Attempt, ChartError> {
-        let &Self { settings: &ChartSettings { order, ref decompose }, monitor } = self;
+        let &Self { settings: &ChartSettings { order, ref decompose, .. }, monitor } = self;
         if let Some(ends) = decompose::contact(chart) {
             return Ok(Attempt::Split(decompose::separate(chart, ends, decompose, monitor)?));
         }
@@ -235,6 +284,21 @@ impl Cutter<'_> {
             }
         }
     }
+}
+
+/// The parts beside part `k`, those first that it has the most boundary in common with.
+fn neighbours(chart: &Chart, owner: &[usize], k: usize) -> Vec<usize> {
+    let mut shared: BTreeMap<usize, f64> = BTreeMap::new();
+    for (_, sides) in chart.edges().iter() {
+        let &[g, h] = sides else { continue };
+        let [of_g, of_h] = [g, h].map(|side| owner[side.face().index()]);
+        if of_g != of_h && (of_g == k || of_h == k) {
+            *shared.entry(if of_g == k { of_h } else { of_g }).or_insert(0.0) += chart.length(g);
+        }
+    }
+    let mut all: Vec<(usize, f64)> = shared.into_iter().collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    all.into_iter().map(|(other, _)| other).collect()
 }
 
 /// Whether a chart has a natural map that stretches hardly, and scales areas by no more than `most`.

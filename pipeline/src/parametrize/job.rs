@@ -10,10 +10,13 @@ use crate::grid::GridPoint;
 use crate::map::boundary::{Boundary, Mids};
 use crate::map::filled::FilledChart;
 use crate::map::linear::{self, LinearMap, flatten_ear_arcs, linear_map};
-use crate::map::natural::{EVEN, NaturalStart, NoNatural, freed_start, natural_start, unfolded_start};
+use crate::map::natural::{
+    EVEN, NaturalStart, NoNatural, boundary_first_start, freed_start, natural_start, start_through, unfolded_start,
+};
 use crate::map::quadratic::{QuadraticMap, min_det, quadratic_map};
 use crate::measure::distortion;
 use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
+use crate::refine;
 use crate::settings::{BoundaryShape, ChartSettings, Order, OutOfRange};
 use crate::untangle::{Dirichlet, Untangled, untangle};
 
@@ -41,15 +44,27 @@ pub struct ChartJob {
     pub chart: Chart,
     /// What its map depends on.
     pub settings: ChartSettings,
+    begun: Begun,
+}
+
+/// How far the maps of a chart are.
+#[derive(Clone, Debug)]
+enum Begun {
+    /// Not at all.
+    Not,
+    /// The chart was refined, and this is a map of it.
+    Refined(Box<Inherited>),
+    /// They are made.
+    Done(Box<Maps>),
 }
 
 /// A chart with a linear map and, for quadratic elements, the harmonic map. The feasible start is certified
 /// already, so that there is always something to publish.
 #[derive(Clone, Debug)]
 pub struct MappedChart {
-    chart: Chart,
-    settings: ChartSettings,
-    maps: Maps,
+    pub(super) chart: Chart,
+    pub(super) settings: ChartSettings,
+    pub(super) maps: Maps,
 }
 
 /// The maps of a chart before untangling.
@@ -77,7 +92,7 @@ impl Maps {
 
     /// The same, as it is to be expected when the map is untangled, with holes or without: that of the harmonic map, and where
     /// that is invalid on a hundredth of the area, more than that of the linear map.
-    fn expected_p99(&self, chart: &Chart) -> f64 {
+    pub(super) fn expected_p99(&self, chart: &Chart) -> f64 {
         let of_nodes =
             |nodes: &[GridPoint]| distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]));
         match &self.harmonic {
@@ -87,6 +102,26 @@ impl Maps {
             }
             Some(Err(_)) | None => of_nodes(&self.start),
         }
+    }
+
+    /// Per triangle of the chart, the share of energy that a bisection would save; nothing where there is no harmonic map.
+    pub(super) fn shares_saved(&self) -> Vec<f64> {
+        match &self.harmonic {
+            Some(Ok(map)) => refine::shares_saved(&self.filled, map.uv()),
+            _ => vec![],
+        }
+    }
+
+    /// What the map of a finer chart inherits, whose vertices lie at `uv` in the linear map.
+    pub(super) fn inherited(&self, chart: &Chart, uv: impl FnOnce(&[GridPoint]) -> Vec<GridPoint>) -> Inherited {
+        let conformal_p99 = distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| self.start[n]));
+        let uv = self.boundary.is_own().then(|| uv(&self.linear.uv()[..self.filled.chart_vertices()]));
+        Inherited { boundary: self.boundary, uv, method: self.linear.method(), conformal_p99 }
+    }
+
+    /// Per triangle of the chart, its longest edge.
+    pub(super) fn longest_edges(&self) -> Vec<f64> {
+        self.filled.shapes()[..self.filled.chart_triangles()].iter().map(|shape| shape.longest()).collect()
     }
 
     /// The share of the chart's triangles that are invalid in its harmonic map; 0 where there is none.
@@ -142,6 +177,16 @@ impl MapError {
 }
 
 impl ChartJob {
+    /// The job to map `chart`.
+    pub fn new(chart: Chart, settings: ChartSettings) -> Self {
+        Self { chart, settings, begun: Begun::Not }
+    }
+
+    /// The job to map `chart`, which was refined: at worst by the map `inherited`.
+    pub(super) fn refined(chart: Chart, settings: ChartSettings, inherited: Inherited) -> Self {
+        Self { chart, settings, begun: Begun::Refined(Box::new(inherited)) }
+    }
+
     /// Maps the chart, and splits it where it touches itself in space, cannot be mapped, would be more distorted than the
     /// settings allow, or where neither the disk nor the plane suits it but its parts, until every part is right. Ends
     /// because parts are smaller, and single triangles map.
@@ -149,34 +194,46 @@ impl ChartJob {
     /// # Errors
     /// [`ChartError`].
     pub fn map(self, monitor: &dyn Monitor) -> Result<Vec<MappedChart>, ChartError> {
+        let Self { chart, settings, begun } = self;
+        settings.check()?;
+        let parts = match begun {
+            Begun::Not => Self::new(chart, settings).mapped_parts(monitor)?,
+            Begun::Done(maps) => return Ok(vec![MappedChart { chart, settings, maps: *maps }]),
+            Begun::Refined(inherited) => match finer_maps(&chart, &settings, Some(*inherited), monitor) {
+                Ok(maps) => vec![(chart, maps)],
+                Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
+                // As if it were a new one.
+                Err(_) => Self::new(chart, settings).mapped_parts(monitor)?,
+            },
+        };
+        let mut mapped = Vec::with_capacity(parts.len());
+        for (chart, maps) in parts {
+            let maps = freed_where_stretched(&chart, &settings, maps, monitor)?;
+            mapped.push(MappedChart { chart, settings, maps });
+        }
+        Ok(mapped)
+    }
+
+    /// The chart with its maps, or its parts with theirs, before any of them is freed from the disk.
+    pub(super) fn mapped_parts(self, monitor: &dyn Monitor) -> Result<Vec<(Chart, Maps)>, ChartError> {
         let settings = self.settings;
         settings.check()?;
         let cutter = Cutter { settings: &settings, monitor };
         let mut mapped = Vec::new();
         let mut waiting = vec![self.chart];
         while let Some(chart) = waiting.pop() {
-            let maps = match cutter.attempt(&chart)? {
-                Attempt::Mapped(maps) => {
-                    let parts = match cutter.parts(&chart, &maps)? {
-                        Some(parts) => parts,
-                        None => vec![(chart, *maps)],
-                    };
-                    for (chart, maps) in parts {
-                        let maps = freed_where_stretched(&chart, &settings, maps, monitor)?;
-                        mapped.push(MappedChart { chart, settings, maps });
-                    }
-                    continue;
-                }
-                Attempt::Split(parts) => {
-                    waiting.extend(parts.into_iter().rev());
-                    continue;
-                }
+            match cutter.attempt(&chart)? {
+                Attempt::Mapped(maps) => match cutter.parts(&chart, &maps)? {
+                    Some(parts) => mapped.extend(parts),
+                    None => mapped.push((chart, *maps)),
+                },
+                Attempt::Split(parts) => waiting.extend(parts.into_iter().rev()),
                 // Its map is what it is.
                 Attempt::Single => {
-                    map_whole(&chart, settings.order, settings.decompose.boundary, f64::INFINITY, monitor)?
+                    let maps = map_whole(&chart, settings.order, settings.decompose.boundary, f64::INFINITY, monitor)?;
+                    mapped.push((chart, maps));
                 }
-            };
-            mapped.push(MappedChart { chart, settings, maps });
+            }
         }
         Ok(mapped)
     }
@@ -196,6 +253,11 @@ impl ChartJob {
 }
 
 impl MappedChart {
+    /// The job whose maps these are: nothing is left to be mapped.
+    pub(super) fn into_job(self) -> ChartJob {
+        ChartJob { chart: self.chart, settings: self.settings, begun: Begun::Done(Box::new(self.maps)) }
+    }
+
     /// The chart.
     pub fn chart(&self) -> &Chart {
         &self.chart
@@ -226,7 +288,7 @@ impl MappedChart {
                 continue;
             };
             for chart in parts.into_iter().rev() {
-                waiting.extend(ChartJob { chart, settings }.map(monitor)?.into_iter().rev());
+                waiting.extend(ChartJob::new(chart, settings).map(monitor)?.into_iter().rev());
             }
         }
         Ok(certified)
@@ -315,12 +377,64 @@ pub(super) fn map_whole(
 /// disk stretches less than this only what is round already.
 const STRETCHED: f64 = 5.0;
 
+/// A map of a refined chart that comes from one of it before.
+#[derive(Clone, Debug)]
+pub(super) struct Inherited {
+    /// The boundary before.
+    pub boundary: BoundaryFound,
+    /// The uv of all vertices in the linear map before; none where its boundary was the circle, which arcs must follow anew.
+    pub uv: Option<Vec<GridPoint>>,
+    /// How that was found.
+    pub method: linear::Method,
+    /// The conformal distortion that 99 % of the area do not exceed in it.
+    pub conformal_p99: f64,
+}
+
+/// The maps of a chart with the natural boundary that is found at once; none where that is not found, or scales areas by more
+/// than [`EVEN`].
+pub(super) fn natural_maps(chart: &Chart, order: Order, monitor: &dyn Monitor) -> Result<Option<Maps>, MapError> {
+    match boundary_first_start(chart, EVEN, monitor)? {
+        Some(start) => FeasibleStart::off_circle(start, BoundaryFound::Natural).mapped(order, monitor).map(Some),
+        None => Ok(None),
+    }
+}
+
+/// The maps of a refined chart: with its natural boundary, where that is found at once and stretches no more than the boundary
+/// before; else with that, and a map inside that is known to be one-to-one.
+pub(super) fn finer_maps(
+    chart: &Chart,
+    settings: &ChartSettings,
+    inherited: Option<Inherited>,
+    monitor: &dyn Monitor,
+) -> Result<Maps, MapError> {
+    let ChartSettings { order, ref decompose, .. } = *settings;
+    let most = decompose.max_area_ratio;
+    if decompose.boundary == BoundaryShape::Natural
+        && let Some(start) = boundary_first_start(chart, most, monitor)?
+        && inherited.as_ref().is_none_or(|before| start.conformal_p99 <= before.conformal_p99)
+    {
+        return FeasibleStart::off_circle(start, BoundaryFound::Natural).mapped(order, monitor);
+    }
+    let mut why_none = None;
+    if let Some(Inherited { boundary, uv, method, .. }) = inherited {
+        if let BoundaryFound::Circle { why_none: why } = boundary {
+            why_none = why;
+        }
+        if let Some(uv) = uv
+            && let Some(start) = start_through(chart, uv, method, monitor)?
+        {
+            return FeasibleStart::off_circle(start, boundary).mapped(order, monitor);
+        }
+    }
+    map_to_disk(chart, order, why_none, most, monitor)
+}
+
 /// The maps of a chart with another boundary, where that stretches less. Those on the circle for want of a natural one get a
 /// natural one inside which a linear map was unfolded, or one that is freed from the disk; those whose natural map is
 /// stretched all the same, as long triangles cannot follow it (of a menger sponge 290 of 3,200 above 100, of milk_truck one
 /// at 58,000, and Gmsh doubled a triangle there), one that is freed from that. This comes after cutting: parts with natural
 /// boundaries are better still.
-fn freed_where_stretched(
+pub(super) fn freed_where_stretched(
     chart: &Chart,
     settings: &ChartSettings,
     maps: Maps,

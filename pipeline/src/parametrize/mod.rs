@@ -10,6 +10,7 @@
 
 mod cut;
 mod job;
+mod survey;
 
 use crate::certified::{CertifiedAtlas, GatherError};
 use crate::decompose::{self, Illegal, decompose, split_ears};
@@ -18,6 +19,7 @@ use crate::monitor::{Interrupted, Monitor};
 use crate::repair::{self, Accepted, repair};
 use crate::settings::{OutOfRange, Settings};
 pub use job::{ChartError, ChartJob, MapError, MappedChart, parametrize_chart};
+pub use survey::{Refinement, Surveyed, refine};
 
 /// Repairs a soup, cuts it into charts, and maps these; each map is proven to be one-to-one. Components that cannot be
 /// processed are left out, and named ([`CertifiedAtlas::refused`]).
@@ -49,6 +51,11 @@ pub fn parametrize_surface(
     monitor: &dyn Monitor,
 ) -> Result<CertifiedAtlas, Error> {
     let Plan { mesh, jobs, .. } = Plan::new(mesh, settings, monitor)?;
+    let mut surveyed = Vec::with_capacity(jobs.len());
+    for job in jobs {
+        surveyed.push(job.survey(monitor)?);
+    }
+    let (mesh, jobs, _) = refine(mesh, surveyed)?;
     let mut certified = Vec::with_capacity(jobs.len());
     for job in jobs {
         certified.extend(job.run(monitor)?);
@@ -127,7 +134,7 @@ impl Plan {
         };
         let feature_edges = atlas.feature_edges();
         let settings = settings.of_charts();
-        let jobs = atlas.into_charts().into_iter().map(|chart| ChartJob { chart, settings }).collect();
+        let jobs = atlas.into_charts().into_iter().map(|chart| ChartJob::new(chart, settings)).collect();
         Ok(Self { mesh, jobs, feature_edges, ears_split })
     }
 }

@@ -22,7 +22,7 @@ fn whole(soup: &TriangleSoup) -> Chart {
 fn job(chart: Chart, max_area_ratio: f64) -> ChartJob {
     let on_disk = decompose::Settings::of(BoundaryShape::Circle);
     let decompose = decompose::Settings { feature_angle: None, max_area_ratio, ..on_disk };
-    ChartJob { chart, settings: ChartSettings { decompose, ..ChartSettings::default() } }
+    ChartJob::new(chart, ChartSettings { decompose, ..ChartSettings::default() })
 }
 
 /// The parts into which one chart of all falls before it is untangled.
@@ -250,5 +250,58 @@ fn a_wall_of_long_facets_is_no_worse_than_the_map_that_untangling_starts_from() 
         let method = chart.provenance().untangle.as_ref().map(|u| u.method);
         let expected = if height == 1.0 { untangle::Method::Harmonic } else { untangle::Method::Start };
         assert_eq!(method, Some(expected), "height {height}");
+    }
+}
+
+/// The wall of a cylinder as CAD exports it, one row of facets, closed by a cone at one end.
+fn cup(around: u32, height: f64) -> TriangleSoup {
+    let circle = |z: f64| {
+        (0..around).map(move |k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(around);
+            [angle.cos(), angle.sin(), z]
+        })
+    };
+    let points: Vec<Vec3> = circle(0.0).chain(circle(height)).chain([[0.0, 0.0, height + 0.7]]).collect();
+    let wall = (0..around).flat_map(|k| {
+        let next = (k + 1) % around;
+        [[k, next, around + next], [k, around + next, around + k], [around + k, around + next, 2 * around]]
+    });
+    TriangleSoup::new(points, wall.collect()).expect("sound")
+}
+
+#[test]
+fn a_row_of_long_facets_is_refined_and_what_comes_of_it_is_the_same_surface() {
+    let soup = cup(36, 2.5);
+    let run = |refine: Option<u32>| {
+        let decompose = decompose::Settings { feature_angle: None, ..decompose::Settings::default() };
+        parametrize(&soup, &Settings { refine, decompose, ..Settings::default() }, &NoMonitor).expect("maps")
+    };
+    let invalid = |atlas: &CertifiedAtlas| -> usize {
+        let of_chart = |c: &CertifiedChart| {
+            c.provenance().harmonic.as_ref().map_or(0, |h| h.invalid.iter().filter(|i| **i).count())
+        };
+        atlas.charts().iter().map(of_chart).sum()
+    };
+    let worst =
+        |atlas: &CertifiedAtlas| atlas.charts().iter().map(|c| c.distortion().conformal_p99).fold(1.0, f64::max);
+    let (coarse, fine) = (run(None), run(Some(4)));
+    assert_eq!((coarse.mesh().triangles().len(), fine.mesh().default_size()), (108, coarse.mesh().default_size()));
+    assert!(invalid(&coarse) > 36 && invalid(&fine) == 0 && worst(&fine) < 1.2 * worst(&coarse));
+    assert!((200..=4 * 108).contains(&fine.mesh().triangles().len()));
+    // Each triangle of the input is found again: its parts have its area, and its corners, and no other vertex of the input.
+    let mesh = fine.mesh();
+    for (triangle, corners) in soup.triangles().iter().enumerate() {
+        let parts: Vec<usize> =
+            (0..mesh.triangles().len()).filter(|f| mesh.source_triangle(*f) as usize == triangle).collect();
+        let mut found: Vec<u32> =
+            parts.iter().flat_map(|f| mesh.triangles()[*f]).filter_map(|v| mesh.input_vertex(v)).collect();
+        found.sort_unstable();
+        found.dedup();
+        let mut expected = corners.to_vec();
+        expected.sort_unstable();
+        assert_eq!(found, expected);
+        let area: f64 = parts.iter().map(|f| crate::vec3::triangle_area(mesh.corners(*f))).sum();
+        let whole = crate::vec3::triangle_area(corners.map(|v| soup.points()[v as usize]));
+        assert!((area / whole - 1.0).abs() < 1e-12);
     }
 }

@@ -1,13 +1,14 @@
 //! Repair: soup -> surface mesh.
 //!
 //! 1. Vertices with bit-equal coordinates are merged (the sign of zero does not count).
-//! 2. Triangles with two equal vertices, and copies of a triangle, are dropped. Slivers stay.
+//! 2. Triangles with two equal vertices, and copies of a triangle, are dropped.
 //! 3. T-junctions are closed: triangles are split where vertices of another side lie on their open edges. Then cracks are:
 //!    open edges that run side by side within a tolerance (see [`Settings::weld`]).
 //! 4. Every orientable component is oriented like the majority of its triangles.
-//! 5. The surface is split along non-manifold edges, and where sheets only touch in a vertex: every sheet gets
+//! 5. Triangles lower than that tolerance are removed where the surface stays what it is: an edge is collapsed or flipped.
+//! 6. The surface is split along non-manifold edges, and where sheets only touch in a vertex: every sheet gets
 //!    vertices of its own.
-//! 6. Edge lengths are mollified where triangles are degenerate ([`crate::mesh::Metric`]).
+//! 7. Edge lengths are mollified where triangles are degenerate ([`crate::mesh::Metric`]).
 //!
 //! Everything that was found and done is counted, with the first few ids. The summary of the result still counts
 //! the non-manifold edges that were split, and the vertices at which a sheet touches others away from its
@@ -17,6 +18,7 @@
 mod cracks;
 mod near;
 mod sheets;
+mod slivers;
 mod t_junctions;
 pub(crate) mod weld;
 
@@ -32,7 +34,7 @@ use t_junctions::Boundary;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Open edges closer than this, relative to the diagonal of the bounding box, are joined, and split at vertices of
-    /// others that are no farther from them. In `[0, 0.01]`; 0 joins none, and splits at vertices that lie on edges within
+    /// others that are no farther from them; triangles lower than this are removed. In `[0, 0.01]`; 0 joins none, and splits at vertices that lie on edges within
     /// the rounding of doubles. Default 1e-6.
     pub weld: f64,
 }
@@ -103,6 +105,12 @@ pub struct Report {
     pub degenerate_triangles: Sample,
     /// Triangles turned over.
     pub flipped_triangles: Sample,
+    /// Triangles with an edge below the tolerance that was collapsed.
+    pub needles_collapsed: Sample,
+    /// Triangles lower than the tolerance whose longest edge was flipped.
+    pub caps_flipped: Sample,
+    /// The farthest that a point of the surface moved with these, in the unit of the input; below the tolerance.
+    pub slivers_moved_by: f64,
     /// Single edges along which sheets meet inside a sheet, halved so that they can be seams.
     pub slits_opened: usize,
     /// Vertices (after welding) that were given to several sheets.
@@ -180,6 +188,8 @@ struct MeshBuilder {
 struct Measure {
     points: Vec<Vec3>,
     tolerance: f64,
+    /// What lengths in the unit of the input are multiplied with.
+    scale: f64,
 }
 
 /// Repairs `soup`. The result depends on the order of the input only through its numbering.
@@ -223,20 +233,26 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     let changed = report.cracks_closed > 0 || report.duplicate_triangles.count > copies;
     edges = renewed(edges, changed, &builder.triangles);
     report.t_junctions_left = builder.t_junctions_left(&edges, &measure);
-    drop(measure);
     // A surface that was counted without inconsistent edges, and has not changed, is oriented as it is.
     let as_counted = report.duplicate_triangles.count == 0 && report.cracks_closed == 0 && !split;
     if !as_counted || raw.inconsistent_edges > 0 {
         report.flipped_triangles = builder.orient(&edges);
         edges = renewed(edges, report.flipped_triangles.count > 0, &builder.triangles);
     }
+    let slivers = slivers::remove(&mut builder, &edges, &measure);
+    report.needles_collapsed = Sample::of(slivers.needles.iter().copied());
+    report.caps_flipped = Sample::of(slivers.caps.iter().copied());
+    report.slivers_moved_by = slivers.deviation / measure.scale;
+    let had_slivers = !slivers.is_empty();
+    edges = renewed(edges, had_slivers, &builder.triangles);
+    drop(measure);
     let input_points = builder.points.len();
     report.slits_opened = builder.open_slits(&edges);
     let opened = report.slits_opened > 0;
     edges = renewed(edges, opened, &builder.triangles);
     report.triangles_added = if split || opened { builder.count_added() } else { 0 };
     // Where the triangles are those that were counted, their counts still hold.
-    let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0 && !opened);
+    let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0 && !had_slivers && !opened);
     let mesh = builder.into_mesh(edges, input_points, known, &mut report);
     // As read: vertices of degenerate triangles count, though these do not.
     Ok(Repaired { mesh, raw: TopologySummary { vertices: used, ..raw }, report })
@@ -297,7 +313,7 @@ impl MeshBuilder {
         // Powers of two change no digit.
         let scale = unit_scale(diagonal);
         let points = self.points.iter().map(|p| p.map(|c| c * scale)).collect();
-        Measure { points, tolerance: weld * diagonal * scale }
+        Measure { points, tolerance: weld * diagonal * scale, scale }
     }
 
     /// Splits triangles where vertices of others lie on their open edges; returns these vertices.

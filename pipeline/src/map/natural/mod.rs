@@ -38,6 +38,7 @@ use crate::monitor::{Interrupted, Monitor};
 pub use conformal::{conformal, conformal_by_corners, spectral_conformal};
 pub use projection::projection;
 pub use start::{NaturalStart, NoNatural, freed_start, natural_start, unfolded_start};
+pub(crate) use start::{boundary_first_start, start_through};
 
 /// Maps are scaled into a disk of this radius: well within what the grid holds exactly.
 const RADIUS: f64 = 0.984375;

@@ -119,6 +119,45 @@ pub fn natural_start(
     Ok(Err(why))
 }
 
+/// As [`natural_start`], by boundary first flattening alone.
+///
+/// # Errors
+/// [`Interrupted`].
+pub(crate) fn boundary_first_start(
+    chart: &Chart,
+    max_area_ratio: f64,
+    monitor: &dyn Monitor,
+) -> Result<Option<NaturalStart>, Interrupted> {
+    let search = Search { chart, filled: FilledChart::open(chart), most: max_area_ratio, monitor };
+    Ok(search.by(Candidate::BoundaryFirst)?.ok())
+}
+
+/// The map whose vertices lie at `uv`, with a boundary of chords, or the linear one in that boundary, where it stretches less;
+/// none where neither is one-to-one. How evenly they scale areas is not asked.
+///
+/// # Errors
+/// [`Interrupted`].
+pub(crate) fn start_through(
+    chart: &Chart,
+    uv: Vec<GridPoint>,
+    method: Method,
+    monitor: &dyn Monitor,
+) -> Result<Option<NaturalStart>, Interrupted> {
+    let search = Search { chart, filled: FilledChart::open(chart), most: f64::INFINITY, monitor };
+    let boundary = Boundary::chords(&search.filled, |v| uv[v.index()]);
+    let through = match LinearMap::through(&search.filled, uv, method) {
+        Ok(through) => search.one_to_one(boundary.clone(), through)?.ok(),
+        Err(_) => None,
+    };
+    let anew = match linear_map(&search.filled, &boundary, monitor) {
+        Ok(anew) => search.one_to_one(boundary, anew)?.ok(),
+        Err(linear::Error::Interrupted(interrupted)) => return Err(interrupted),
+        Err(_) => None,
+    };
+    let less = |a: &NaturalStart, b: &NaturalStart| a.conformal_p99.total_cmp(&b.conformal_p99);
+    Ok([anew, through].into_iter().flatten().min_by(less))
+}
+
 /// Finds a natural boundary of `chart` that is simple, and unfolds a map inside it, where [`natural_start`] found linear ones
 /// only that fold; none where there is none, or its areas are scaled too unevenly, as there.
 ///
@@ -303,27 +342,39 @@ impl Search<'_> {
     /// The start by a linear map, if it is one-to-one and scales areas evenly. Whether the boundary is flattened first decides
     /// how evenly.
     fn proven(&self, boundary: Boundary, linear: LinearMap, is_flattened: bool) -> Result<Found, Interrupted> {
-        let Self { chart, filled, most, monitor } = self;
-        let refused = |why: NoNatural| Ok(Err(Some(why)));
-        let checkpoint = Checkpoint::new(*monitor);
-        checkpoint.end()?;
+        let Self { chart, most, monitor, .. } = self;
+        let start = match self.one_to_one(boundary, linear)? {
+            Ok(start) => start,
+            Err(why) => return Ok(Err(Some(why))),
+        };
+        Checkpoint::new(*monitor).end()?;
+        let ratio = self.area_ratio(&start.certified, is_flattened);
+        let is_smooth = is_flattened && (chart.holes().is_empty() || start.conformal_p99 <= STRETCHED);
+        let most = if is_smooth { *most } else { most.min(EVEN) };
+        if ratio > most {
+            return Ok(Err(Some(NoNatural::Uneven { ratio })));
+        }
+        Ok(Ok(start))
+    }
+
+    /// The start by a linear map, if it is one-to-one.
+    fn one_to_one(
+        &self,
+        boundary: Boundary,
+        linear: LinearMap,
+    ) -> Result<Result<NaturalStart, NoNatural>, Interrupted> {
+        let Self { chart, filled, monitor, .. } = self;
+        Checkpoint::new(*monitor).end()?;
         let nodes = linear.degree_elevated(filled, &boundary);
         let cells = chart.cells().collect();
         let certified = match prove(PlanarMap { cells, nodes: nodes.clone(), hole_centres: vec![] }) {
             Ok(certified) => certified,
             Err(certify::Error::InvalidTriangles { count, .. }) => {
-                return refused(NoNatural::Folded { triangles: count });
+                return Ok(Err(NoNatural::Folded { triangles: count }));
             }
-            Err(_) => return refused(NoNatural::Crossing),
+            Err(_) => return Ok(Err(NoNatural::Crossing)),
         };
-        checkpoint.end()?;
-        let ratio = self.area_ratio(&certified, is_flattened);
         let conformal_p99 = distortion::conformal_p99_of_nodes(chart, |f| filled.nodes(f).map(|n| nodes[n]));
-        let is_smooth = is_flattened && (chart.holes().is_empty() || conformal_p99 <= STRETCHED);
-        let most = if is_smooth { *most } else { most.min(EVEN) };
-        if ratio > most {
-            return refused(NoNatural::Uneven { ratio });
-        }
         let filled = filled.clone();
         Ok(Ok(NaturalStart { filled, boundary, linear, nodes, certified, conformal_p99 }))
     }
