@@ -250,7 +250,7 @@ pub fn repair(soup: &TriangleSoup, settings: &Settings) -> Result<Repaired, Erro
     report.slits_opened = builder.open_slits(&edges);
     let opened = report.slits_opened > 0;
     edges = renewed(edges, opened, &builder.triangles);
-    report.triangles_added = if split || opened { builder.count_added() } else { 0 };
+    report.triangles_added = if split || had_slivers || opened { builder.count_added() } else { 0 };
     // Where the triangles are those that were counted, their counts still hold.
     let known = Some(&raw).filter(|_| as_counted && report.flipped_triangles.count == 0 && !had_slivers && !opened);
     let mesh = builder.into_mesh(edges, input_points, known, &mut report);

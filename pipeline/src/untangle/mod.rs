@@ -81,6 +81,25 @@ impl Report {
         let nodes_moved = nodes_moved(chart, start, minimiser);
         Self { method: Method::Start, nodes_moved, energy: self.energy_start, gradient_norm: 0.0, ..self }
     }
+
+    /// The same where nothing else was tried.
+    pub(crate) fn of_start_alone<O: Objective>(
+        chart: &FilledChart,
+        objective: &O,
+        start: &[GridPoint],
+        minimiser: &QuadraticMap,
+    ) -> Self {
+        let energy_start = total_on_grid(chart, objective, start);
+        Self {
+            method: Method::Start,
+            iterations: 0,
+            nodes_moved: nodes_moved(chart, start, minimiser),
+            energy_unconstrained: total(chart, objective, minimiser.uv()),
+            energy_start,
+            energy: energy_start,
+            gradient_norm: 0.0,
+        }
+    }
 }
 
 fn nodes_moved(chart: &FilledChart, nodes: &[GridPoint], minimiser: &QuadraticMap) -> usize {
