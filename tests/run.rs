@@ -362,3 +362,70 @@ fn an_extension_that_lies_is_seen_through() {
         assert_eq!(report.content.expect("it was read").format, format, "{name}");
     }
 }
+
+/// A cup as CAD exports it: its wall is one row of facets, closed by a cone.
+fn cup() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let around = 36;
+    let circle = |z: f64| {
+        (0..around).map(move |k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(around);
+            [angle.cos(), angle.sin(), z]
+        })
+    };
+    let points = circle(0.0).chain(circle(2.5)).chain([[0.0, 0.0, 3.2]]).collect();
+    let facets = (0..around).flat_map(|k| {
+        let next = (k + 1) % around;
+        [[k, next, around + next], [k, around + next, around + k], [around + k, around + next, 2 * around]]
+    });
+    (points, facets.collect())
+}
+
+/// Where maps need more triangles they get some, the report tells how many, and from the files alone the input's triangles are
+/// found again.
+#[test]
+fn refined_triangles_tell_whose_parts_they_are() {
+    use std::fmt::Write;
+    let (points, facets) = cup();
+    let mut text = String::new();
+    points.iter().for_each(|[x, y, z]| writeln!(text, "v {x} {y} {z}").expect("in memory"));
+    facets.iter().for_each(|[a, b, c]| writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).expect("in memory"));
+    let out = Out::new();
+    let off = ["--feature-angle", "off"];
+    let (_, coarse) = out.run_bytes_with("cup.obj", text.as_bytes(), &[&off[..], &["--refine", "off"]].concat());
+    let (_, fine) = out.run_bytes_with("cup.obj", text.as_bytes(), &off);
+    let told = [&coarse, &fine].map(|report| report.refinement.clone().expect("told"));
+    assert_eq!((coarse.settings.refine, fine.settings.refine), (None, Some(4)));
+    assert_eq!((told[0].charts, told[0].triangles_after, told[0].places.len()), (0, 108, 0));
+    assert!(told[1].charts == 1 && told[1].triangles_after > 200 && !told[1].places.is_empty());
+    let asked = told[1].triangles_after - told[1].triangles_before - told[1].by_closure;
+    assert!(told[1].triangles_before + asked <= 4 * told[1].triangles_before);
+    let invalid =
+        |report: &Report| report.charts.iter().filter_map(|c| c.quadratic.as_ref()).map(|q| q.invalid).sum::<usize>();
+    assert!(invalid(&coarse) > 36 && invalid(&fine) == 0);
+
+    let grid = planish::formats::vtu::read(&std::fs::read(out.of("cup.obj").join("surface.vtu")).expect("written"));
+    let grid = grid.expect("readable");
+    assert_eq!(grid.cells.len(), told[1].triangles_after);
+    for (number, facet) in facets.iter().enumerate() {
+        let mut corners = Vec::new();
+        let mut area = [0.0; 3];
+        for (cell, _) in grid.cells.iter().zip(&grid.triangle).filter(|(_, source)| **source as usize == number) {
+            corners.extend(cell[..3].iter().map(|n| grid.vertex[*n as usize]).filter(|v| *v >= 0));
+            let [p, q, r] = [0, 1, 2].map(|k| grid.points[cell[k] as usize]);
+            let (a, b) = ([0, 1, 2].map(|k| q[k] - p[k]), [0, 1, 2].map(|k| r[k] - p[k]));
+            (0..3).for_each(|k| area[k] += a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
+        }
+        corners.sort_unstable();
+        corners.dedup();
+        let mut expected = facet.map(|v| v as i32);
+        expected.sort_unstable();
+        assert_eq!(corners, expected, "triangle {number}");
+        let [p, q, r] = facet.map(|v| points[v as usize]);
+        let (a, b) = ([0, 1, 2].map(|k| q[k] - p[k]), [0, 1, 2].map(|k| r[k] - p[k]));
+        let whole = [0, 1, 2].map(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]);
+        assert!((0..3).all(|k| (area[k] - whole[k]).abs() < 1e-12), "triangle {number}: {area:?} {whole:?}");
+    }
+    for wrong in ["0", "1001", "x", "-1"] {
+        assert_eq!(out.run(&[&fixture("sphere.stl")], &[&format!("--refine={wrong}")]).code, Some(2), "{wrong}");
+    }
+}
