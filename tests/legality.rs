@@ -262,13 +262,16 @@ fn differences(grid: &Grid, report: &Report) -> Vec<String> {
 
 /// The Euler number of the charts glued along their seams.
 fn glued_euler(grid: &Grid, charts: &BTreeMap<i32, Vec<usize>>) -> i64 {
-    let corners = grid.cells.iter().flat_map(|c| &c[..3]);
-    let vertices: BTreeSet<Place> = corners.map(|n| place(grid, *n)).collect();
-    let (mut inner, mut seams) = (0, BTreeSet::new());
+    let (mut inner, mut seams, mut on_rim) = (0, BTreeSet::new(), BTreeSet::new());
     for edges in charts.values().map(|cells| edges(grid, cells)) {
         inner += edges.values().filter(|sides| sides.len() > 1).count();
         seams.extend(rim(&edges).map(|s| sorted(place(grid, s.from(grid)), place(grid, s.to(grid)))));
+        on_rim.extend(rim(&edges).flat_map(|s| [s.from(grid), s.to(grid)]));
     }
+    // Vertices that were added inside of two sheets may lie at the same place: what is inside a chart is its own.
+    let corners: BTreeSet<u32> = grid.cells.iter().flat_map(|c| &c[..3]).copied().collect();
+    let own = |n: &u32| Some(*n).filter(|n| !on_rim.contains(n));
+    let vertices: BTreeSet<(Option<u32>, Place)> = corners.iter().map(|n| (own(n), place(grid, *n))).collect();
     vertices.len() as i64 - (inner + seams.len()) as i64 + grid.cells.len() as i64
 }
 

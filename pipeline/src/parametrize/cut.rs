@@ -16,7 +16,7 @@ use crate::map::natural;
 use crate::measure::distortion;
 use crate::monitor::{Interrupted, Monitor};
 use crate::settings::{BoundaryShape, ChartSettings};
-use crate::topology::FaceId;
+use crate::topology::{FaceId, Stars, VertexId};
 use std::collections::BTreeMap;
 
 /// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
@@ -59,6 +59,12 @@ const UNROLLED: f64 = 1.1;
 
 /// Parts of no more triangles than this are joined to neighbours, where that can be.
 const SMALL: usize = 64;
+
+/// Corners of parts that are sharper than this, in radians (6 degrees), are given away: elements there have a gamma below 0.1.
+const SHARP: f64 = 0.1;
+
+/// How often all corners are looked at: what is given away may leave another sharp corner, at most.
+const ROUNDS: usize = 3;
 
 /// What the map of two joined parts may stretch.
 const JOINED: f64 = 3.0;
@@ -227,7 +233,50 @@ impl Cutter<'_> {
                 }
             }
         }
+        self.blunt(chart, &mut owner, &mut parts)?;
         Ok(parts.into_iter().flatten().collect())
+    }
+
+    /// Gives the triangles at the sharp corners of parts to a neighbour, where both have maps that suit a mesher then: no element
+    /// is any good in a corner like that. Each corner is looked at once in a round.
+    fn blunt(&self, chart: &Chart, owner: &mut [usize], parts: &mut [Option<Mapped>]) -> Result<(), ChartError> {
+        let stars = Stars::new(chart.triangles(), chart.vertices().len());
+        for _ in 0..ROUNDS {
+            let mut any = false;
+            for v in (0..chart.vertices().len()).map(VertexId::at) {
+                for corner in sharp_corners(chart, &stars, owner, v) {
+                    any |= self.give_away(chart, owner, parts, &corner)?;
+                }
+            }
+            if !any {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives the triangles in a corner to the first neighbour that can take them; whether there was one.
+    fn give_away(
+        &self,
+        chart: &Chart,
+        owner: &mut [usize],
+        parts: &mut [Option<Mapped>],
+        Corner { from, fan, beside }: &Corner,
+    ) -> Result<bool, ChartError> {
+        if fan.iter().any(|f| owner[f.index()] != *from) {
+            return Ok(false);
+        }
+        for to in beside {
+            fan.iter().for_each(|f| owner[f.index()] = *to);
+            if let Some(smaller) = self.join(chart, owner, [*from; 2])?
+                && let Some(larger) = self.join(chart, owner, [*to; 2])?
+            {
+                (parts[*from], parts[*to]) = (Some(smaller), Some(larger));
+                return Ok(true);
+            }
+        }
+        fan.iter().for_each(|f| owner[f.index()] = *from);
+        Ok(false)
     }
 
     /// Two parts of `chart` as one, if its map suits a mesher.
@@ -286,6 +335,45 @@ impl Cutter<'_> {
     }
 }
 
+/// A corner of a part that is sharper than [`SHARP`].
+struct Corner {
+    /// The part.
+    from: usize,
+    /// Its triangles at the corner; it has more.
+    fan: Vec<FaceId>,
+    /// The parts beside them at the corner, that with the longest edge in common first.
+    beside: Vec<usize>,
+}
+
+/// The sharp corners of parts at a vertex.
+fn sharp_corners(chart: &Chart, stars: &Stars, owner: &[usize], v: VertexId) -> Vec<Corner> {
+    let around: Vec<FaceId> = stars.around(v.index()).iter().map(|f| FaceId(*f)).collect();
+    let mut of_parts: Vec<usize> = around.iter().map(|f| owner[f.index()]).collect();
+    of_parts.sort_unstable();
+    of_parts.dedup();
+    if of_parts.len() < 2 {
+        return vec![];
+    }
+    let angle = |f: &FaceId| {
+        let angles = chart.shapes()[f.index()].angles();
+        (0..3).filter(|k| chart.triangles()[f.index()][*k] == v).map(|k| angles[k]).sum::<f64>()
+    };
+    let mut corners = Vec::new();
+    for from in of_parts {
+        let fan: Vec<FaceId> = around.iter().copied().filter(|f| owner[f.index()] == from).collect();
+        let is_all = owner.iter().filter(|o| **o == from).nth(fan.len()).is_none();
+        if is_all || fan.iter().map(angle).sum::<f64>() >= SHARP {
+            continue;
+        }
+        let sides = fan.iter().flat_map(|f| f.sides()).filter(|h| [chart.from(*h), chart.from(h.next())].contains(&v));
+        let beyond = sides.filter_map(|h| Some((chart.length(h), owner[chart.edges().twin(h)?.face().index()])));
+        let mut beside: Vec<(f64, usize)> = beyond.filter(|(_, to)| *to != from).collect();
+        beside.sort_by(|a, b| b.0.total_cmp(&a.0));
+        corners.push(Corner { from, fan, beside: beside.into_iter().map(|(_, to)| to).collect() });
+    }
+    corners
+}
+
 /// The parts beside part `k`, those first that it has the most boundary in common with.
 fn neighbours(chart: &Chart, owner: &[usize], k: usize) -> Vec<usize> {
     let mut shared: BTreeMap<usize, f64> = BTreeMap::new();
@@ -325,4 +413,50 @@ fn left_of_hole(chart: &Chart, map: &Maps) -> Option<Vec<bool>> {
         along[0] * from[1] > along[1] * from[0]
     };
     Some(start.map().cells.iter().map(is_left).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriangleSoup;
+    use crate::monitor::NoMonitor;
+    use crate::{decompose, repair};
+
+    /// A square whose lower side is a needle with its tip at the origin, and a triangle beyond its short side.
+    fn with_needle() -> Chart {
+        let points =
+            vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.05, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0]];
+        let soup = TriangleSoup::new(points, vec![[0, 1, 2], [1, 5, 2], [0, 2, 3], [0, 3, 4]]).expect("sound");
+        let mesh = repair(&soup, &Default::default()).expect("a surface").mesh;
+        decompose::assemble(&mesh, &[0; 4]).expect("one chart").into_charts().remove(0)
+    }
+
+    #[test]
+    fn sharp_corners_of_parts_are_given_to_their_neighbours() {
+        let (chart, settings) = (with_needle(), ChartSettings::default());
+        let cutter = Cutter { settings: &settings, monitor: &NoMonitor };
+        let mut owner = vec![0, 0, 1, 1];
+        let part = |owner: &[usize], k| cutter.join(&chart, owner, [k; 2]).expect("nobody interrupts");
+        let mut parts = vec![part(&owner, 0), part(&owner, 1)];
+        assert!(parts.iter().all(Option::is_some));
+        cutter.blunt(&chart, &mut owner, &mut parts).expect("nobody interrupts");
+        assert_eq!(owner, [1, 0, 1, 1]);
+        let sizes: Vec<usize> = parts.iter().flatten().map(|(part, _)| part.triangles().len()).collect();
+        assert_eq!(sizes, [1, 3]);
+        // What is all of a part stays, and so does what is not sharp.
+        let stars = Stars::new(chart.triangles(), chart.vertices().len());
+        for v in (0..6).map(VertexId) {
+            assert!(sharp_corners(&chart, &stars, &[0, 1, 2, 3], v).is_empty());
+            assert!(sharp_corners(&chart, &stars, &owner, v).is_empty());
+        }
+    }
+
+    #[test]
+    fn small_parts_are_joined_where_one_map_suits_both() {
+        let (chart, settings) = (with_needle(), ChartSettings::default());
+        let cutter = Cutter { settings: &settings, monitor: &NoMonitor };
+        let part = |k| cutter.join(&chart, &[0, 1, 2, 3], [k; 2]).expect("nobody interrupts").expect("it maps");
+        let joined = cutter.joined(&chart, (0..4).map(part).collect()).expect("nobody interrupts");
+        assert_eq!(joined.len(), 1, "a flat chart is one part");
+    }
 }
