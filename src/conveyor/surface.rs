@@ -61,7 +61,8 @@ impl<T> Surface<T> {
         parts.missing == 0
     }
 
-    /// What is known so far, and the surface with what became of all charts in order, or why there are not all. Once: nothing is left here.
+    /// What is known so far, and the surface with what became of all charts in order, or why there are not all. Once: nothing
+    /// is left here.
     pub fn collect(&self) -> (Facts, Result<(SurfaceMesh, Vec<T>), Abort>) {
         let mut parts = self.parts.lock();
         let done = std::mem::take(&mut parts.done).into_values().collect();

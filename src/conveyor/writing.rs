@@ -74,8 +74,8 @@ pub(super) fn write(finished: Finished, after: &After) {
             let in_flight = surface.in_flight.clone();
             let assembled = in_flight.compute(Stage::Write, |monitor| {
                 let (mesh, charts) = done?;
-                let (certified, files) =
-                    stages::assemble(mesh, charts.concat(), surface.whole, &in_flight.settings, monitor)?;
+                let charts = charts.into_iter().flatten().collect();
+                let (certified, files) = stages::assemble(mesh, charts, surface.whole, &in_flight.settings, monitor)?;
                 let report = facts.clone().certified(&in_flight.settings, certified);
                 Ok((report, not_too_large(files, &in_flight)?))
             });

@@ -189,7 +189,7 @@ pub enum SettingsError {
     /// The order is not 1 or 2.
     #[error("order is {0}; it must be 1 (linear) or 2 (quadratic)")]
     Order(u8),
-    /// No triangle may stay, or there would be no end.
+    /// The factor is out of range.
     #[error("refine is {0}; it must lie between 1 and {MOST_REFINED}, or be off")]
     Refine(u32),
     /// The tolerance is out of range.

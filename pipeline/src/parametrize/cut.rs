@@ -224,7 +224,7 @@ impl Cutter<'_> {
                 continue;
             }
             for other in neighbours(chart, &owner, k) {
-                if let Some(joined) = self.join(chart, &owner, [k, other])? {
+                if let Some(joined) = self.join(chart, &owner, &[k, other])? {
                     owner.iter_mut().filter(|o| **o == other).for_each(|o| *o = k);
                     parts[other] = None;
                     parts[k] = Some(joined);
@@ -268,8 +268,8 @@ impl Cutter<'_> {
         }
         for to in beside {
             fan.iter().for_each(|f| owner[f.index()] = *to);
-            if let Some(smaller) = self.join(chart, owner, [*from; 2])?
-                && let Some(larger) = self.join(chart, owner, [*to; 2])?
+            if let Some(smaller) = self.join(chart, owner, &[*from])?
+                && let Some(larger) = self.join(chart, owner, &[*to])?
             {
                 (parts[*from], parts[*to]) = (Some(smaller), Some(larger));
                 return Ok(true);
@@ -279,15 +279,16 @@ impl Cutter<'_> {
         Ok(false)
     }
 
-    /// Two parts of `chart` as one, if its map suits a mesher.
-    fn join(&self, chart: &Chart, owner: &[usize], pair: [usize; 2]) -> Result<Option<Mapped>, ChartError> {
-        let faces: Vec<FaceId> = (0..owner.len()).filter(|f| pair.contains(&owner[*f])).map(FaceId::at).collect();
-        let Some(both) = decompose::part_of(chart, &faces).filter(|both| decompose::contact(both).is_none()) else {
+    /// These parts of `chart` as one, if its map suits a mesher.
+    fn join(&self, chart: &Chart, owner: &[usize], parts: &[usize]) -> Result<Option<Mapped>, ChartError> {
+        let faces: Vec<FaceId> = (0..owner.len()).filter(|f| parts.contains(&owner[*f])).map(FaceId::at).collect();
+        let Some(joined) = decompose::part_of(chart, &faces).filter(|joined| decompose::contact(joined).is_none())
+        else {
             return Ok(None);
         };
-        let map = natural_maps(&both, self.settings.order, self.monitor)?;
-        let suits = |map: &Maps| map.conformal_p99(&both) <= JOINED && map.invalid_share(&both) <= TANGLED;
-        Ok(map.filter(suits).map(|map| (both, map)))
+        let map = natural_maps(&joined, self.settings.order, self.monitor)?;
+        let suits = |map: &Maps| map.conformal_p99(&joined) <= JOINED && map.invalid_share(&joined) <= TANGLED;
+        Ok(map.filter(suits).map(|map| (joined, map)))
     }
 
     /// Maps a chart, or splits it once where it touches itself in space, cannot be mapped, or would be too distorted.
@@ -436,7 +437,7 @@ mod tests {
         let (chart, settings) = (with_needle(), ChartSettings::default());
         let cutter = Cutter { settings: &settings, monitor: &NoMonitor };
         let mut owner = vec![0, 0, 1, 1];
-        let part = |owner: &[usize], k| cutter.join(&chart, owner, [k; 2]).expect("nobody interrupts");
+        let part = |owner: &[usize], k| cutter.join(&chart, owner, &[k]).expect("nobody interrupts");
         let mut parts = vec![part(&owner, 0), part(&owner, 1)];
         assert!(parts.iter().all(Option::is_some));
         cutter.blunt(&chart, &mut owner, &mut parts).expect("nobody interrupts");
@@ -455,7 +456,7 @@ mod tests {
     fn small_parts_are_joined_where_one_map_suits_both() {
         let (chart, settings) = (with_needle(), ChartSettings::default());
         let cutter = Cutter { settings: &settings, monitor: &NoMonitor };
-        let part = |k| cutter.join(&chart, &[0, 1, 2, 3], [k; 2]).expect("nobody interrupts").expect("it maps");
+        let part = |k| cutter.join(&chart, &[0, 1, 2, 3], &[k]).expect("nobody interrupts").expect("it maps");
         let joined = cutter.joined(&chart, (0..4).map(part).collect()).expect("nobody interrupts");
         assert_eq!(joined.len(), 1, "a flat chart is one part");
     }

@@ -199,7 +199,7 @@ impl ChartJob {
         let parts = match begun {
             Begun::Not => Self::new(chart, settings).mapped_parts(monitor)?,
             Begun::Done(maps) => return Ok(vec![MappedChart { chart, settings, maps: *maps }]),
-            Begun::Refined(inherited) => match finer_maps(&chart, &settings, Some(*inherited), monitor) {
+            Begun::Refined(inherited) => match finer_maps(&chart, &settings, *inherited, monitor) {
                 Ok(maps) => vec![(chart, maps)],
                 Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
                 // As if it were a new one.
@@ -404,28 +404,24 @@ pub(super) fn natural_maps(chart: &Chart, order: Order, monitor: &dyn Monitor) -
 pub(super) fn finer_maps(
     chart: &Chart,
     settings: &ChartSettings,
-    inherited: Option<Inherited>,
+    inherited: Inherited,
     monitor: &dyn Monitor,
 ) -> Result<Maps, MapError> {
     let ChartSettings { order, ref decompose, .. } = *settings;
     let most = decompose.max_area_ratio;
     if decompose.boundary == BoundaryShape::Natural
         && let Some(start) = boundary_first_start(chart, most, monitor)?
-        && inherited.as_ref().is_none_or(|before| start.conformal_p99 <= before.conformal_p99)
+        && start.conformal_p99 <= inherited.conformal_p99
     {
         return FeasibleStart::off_circle(start, BoundaryFound::Natural).mapped(order, monitor);
     }
-    let mut why_none = None;
-    if let Some(Inherited { boundary, uv, method, .. }) = inherited {
-        if let BoundaryFound::Circle { why_none: why } = boundary {
-            why_none = why;
-        }
-        if let Some(uv) = uv
-            && let Some(start) = start_through(chart, uv, method, monitor)?
-        {
-            return FeasibleStart::off_circle(start, boundary).mapped(order, monitor);
-        }
+    let Inherited { boundary, uv, method, .. } = inherited;
+    if let Some(uv) = uv
+        && let Some(start) = start_through(chart, uv, method, monitor)?
+    {
+        return FeasibleStart::off_circle(start, boundary).mapped(order, monitor);
     }
+    let why_none = if let BoundaryFound::Circle { why_none } = boundary { why_none } else { None };
     map_to_disk(chart, order, why_none, most, monitor)
 }
 

@@ -120,6 +120,7 @@ fn finer(coarse: &MappedChart, monitor: &dyn Monitor) -> Result<Option<Finer>, C
     let room = largest.saturating_sub(before);
     let mut wanted = wanted(maps, before, room);
     let mut refined = Refined::new(chart.to_surface());
+    let own: Vec<VertexId> = (0..chart.vertices().len()).map(VertexId::at).collect();
     let (mut best, mut idle) = (None, 0);
     for _ in 0..ROUNDS {
         let (had, room) = (refined.parents.len(), room.saturating_sub(refined.asked));
@@ -132,9 +133,8 @@ fn finer(coarse: &MappedChart, monitor: &dyn Monitor) -> Result<Option<Finer>, C
         let Some(fresh) = assembled.into_charts().pop() else { break };
         // Its surface is the chart, whose vertices it has first.
         let fresh = with_outer(fresh, chart.id(), chart.from(chart.outer()[0]));
-        let own: Vec<VertexId> = (0..chart.vertices().len()).map(VertexId::at).collect();
         let inherited = maps.inherited(chart, |uv| inherited_uv(&own, uv, fresh.vertices(), &refined.ends));
-        let finer = match finer_maps(&fresh, settings, Some(inherited), monitor) {
+        let finer = match finer_maps(&fresh, settings, inherited, monitor) {
             Ok(maps) => MappedChart { chart: fresh, settings: *settings, maps },
             Err(MapError::Interrupted(interrupted)) => return Err(interrupted.into()),
             // It has a map as it is, and may have none that is better.

@@ -34,8 +34,8 @@ use t_junctions::Boundary;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Open edges closer than this, relative to the diagonal of the bounding box, are joined, and split at vertices of
-    /// others that are no farther from them; triangles lower than this are removed. In `[0, 0.01]`; 0 joins none, and splits at vertices that lie on edges within
-    /// the rounding of doubles. Default 1e-6.
+    /// others that are no farther from them; triangles lower than this are removed. In `[0, 0.01]`; 0 joins and removes none,
+    /// and splits at vertices that lie on edges within the rounding of doubles. Default 1e-6.
     pub weld: f64,
 }
 

@@ -9,8 +9,9 @@
 //! *It ends.* A collapse leaves fewer triangles; a flip leaves as many, and replaces an edge by a shorter one.
 
 use super::{Measure, MeshBuilder};
+use crate::mesh::TriangleShape;
 use crate::topology::{EdgeTable, VertexId};
-use crate::vec3::{Vec3, cross, distance, dot, sub};
+use crate::vec3::{Vec3, cross, distance, dot, norm, sub};
 use std::collections::VecDeque;
 
 /// What was removed.
@@ -92,9 +93,7 @@ impl Shapes<'_> {
 
     /// Whether a triangle is lower than the tolerance.
     fn is_low(&self, corners: [Vec3; 3]) -> bool {
-        let longest = lengths(corners).into_iter().fold(0.0, f64::max);
-        let doubled = normal(corners);
-        dot(doubled, doubled).sqrt() < self.measure.tolerance * longest
+        norm(normal(corners)) < self.measure.tolerance * TriangleShape::of(corners).longest()
     }
 
     fn is_sliver(&self, face: usize) -> bool {
@@ -161,7 +160,7 @@ impl<'a> Work<'a> {
 
     /// How a sliver can be removed; none where it cannot.
     fn step(&self, face: usize) -> Option<Step> {
-        let lengths = lengths(self.shapes().corners(face));
+        let TriangleShape { lengths } = TriangleShape::of(self.shapes().corners(face));
         let by_length = |a: &usize, b: &usize| lengths[*a].total_cmp(&lengths[*b]);
         let (shortest, longest) = ((0..3).min_by(by_length)?, (0..3).max_by(by_length)?);
         if lengths[shortest] < self.measure.tolerance {
@@ -206,8 +205,7 @@ impl<'a> Work<'a> {
         let [p, q, r] = [0, 1, 2].map(|k| self.builder.triangles[face][(longest + k) % 3]);
         let s = self.builder.triangles[beyond][(side + 2) % 3];
         let length = distance(shapes.at(p), shapes.at(q));
-        let doubled = normal(shapes.corners(face));
-        let height = dot(doubled, doubled).sqrt() / length;
+        let height = norm(normal(shapes.corners(face))) / length;
         let moved = self.moved_face[face].max(self.moved_face[beyond]) + height;
         let is_shorter = distance(shapes.at(r), shapes.at(s)) < length;
         let are_neighbours = self.stars[r.index()].iter().any(|f| self.builder.triangles[*f].contains(&s));
@@ -258,11 +256,6 @@ impl<'a> Work<'a> {
         around.dedup();
         around
     }
-}
-
-/// The lengths of the edges 01, 12, 20.
-fn lengths([a, b, c]: [Vec3; 3]) -> [f64; 3] {
-    [distance(a, b), distance(b, c), distance(c, a)]
 }
 
 /// Twice the area of a triangle, as a vector along its normal.

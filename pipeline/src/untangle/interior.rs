@@ -84,10 +84,11 @@ fn step<O: Objective>(
     let mut model = problem.model(x, analysis.pattern());
     let along = problem.newton_step(analysis, &mut model)?;
     let direction = problem.direction(&along);
-    let course = problem.course(x, &direction);
+    let quantities = problem.quantities(x);
+    let course = problem.course(x, &quantities, &direction);
     let energy_slope: f64 = along.iter().zip(&model.energy_gradient).map(|(s, g)| s * g).sum();
     let promised: f64 = -0.5 * along.iter().zip(&model.gradient).map(|(s, g)| s * g).sum::<f64>();
-    let merit = problem.merit(x, None);
+    let merit = problem.merit(x, &quantities);
     let size = merit.energy.abs().max(f64::MIN_POSITIVE);
     outcome.decrement = promised.max(0.0) / size;
     if promised.is_nan() || (outcome.decrement <= tolerance && merit.distance <= tolerance * size) {
@@ -103,8 +104,9 @@ fn step<O: Objective>(
             let d = direction[*n as usize];
             x[*n as usize] = [p[0] + share * d[0], p[1] + share * d[1]];
         }
-        if let Some(bounds) = problem.moved_bounds(x, &course, share, of_dual) {
-            let reached = problem.merit(x, Some(&bounds)).total;
+        let quantities = problem.quantities(x);
+        if let Some(bounds) = problem.moved_bounds(&quantities, &course, share, of_dual) {
+            let reached = problem.merit_with(&bounds, x, &quantities).total;
             if reached <= merit.total + DECREASE * share * slope && reached < merit.total {
                 problem.set_bounds(bounds);
                 outcome.iterations += 1;

@@ -193,7 +193,7 @@ impl<'a, O: Objective> Problem<'a, O> {
     }
 
     /// All quantities that are constrained, in the order of the constraints.
-    fn quantities(&self, x: &[[f64; 2]]) -> Vec<f64> {
+    pub fn quantities(&self, x: &[[f64; 2]]) -> Vec<f64> {
         let mut all = Vec::with_capacity(self.bounds.len());
         for cell in self.cells.iter().filter(|cell| cell.first.is_some()) {
             all.extend(CornerDerivatives::new(&at(x, &cell.nodes)).dets());
@@ -279,11 +279,11 @@ impl<'a, O: Objective> Problem<'a, O> {
         direction
     }
 
-    /// Where a step leads from `x`; what distances cost is raised where it must be.
-    pub fn course(&mut self, x: &[[f64; 2]], direction: &[[f64; 2]]) -> Course {
-        let (quantities, slopes) = (self.quantities(x), self.slopes(x, direction));
+    /// Where a step leads from `x`, which has these quantities; what distances cost is raised where it must be.
+    pub fn course(&mut self, x: &[[f64; 2]], quantities: &[f64], direction: &[[f64; 2]]) -> Course {
+        let slopes = self.slopes(x, direction);
         let mut course = Course { changes: vec![], begin: vec![], slope: 0.0 };
-        for (bound, (c, slope)) in self.bounds.iter_mut().zip(quantities.into_iter().zip(slopes)) {
+        for (bound, (&c, slope)) in self.bounds.iter_mut().zip(quantities.iter().zip(slopes)) {
             let change = bound.change(c, slope);
             bound.raise_cost(&change);
             course.slope += bound.slope(c, &change);
@@ -293,11 +293,10 @@ impl<'a, O: Objective> Problem<'a, O> {
         course
     }
 
-    /// The constraints after these shares of the changes of slacks and multipliers, which brought the map to `x`; none where it
-    /// left the valid maps and must not.
-    pub fn moved_bounds(&self, x: &[[f64; 2]], course: &Course, share: f64, of_dual: f64) -> Option<Vec<Bound>> {
-        let quantities = self.quantities(x);
-        let moved = |((bound, change), c): ((&Bound, &Change), f64)| {
+    /// The constraints after these shares of the changes of slacks and multipliers, which brought the quantities to what is
+    /// given; none where the map left the valid ones and must not.
+    pub fn moved_bounds(&self, quantities: &[f64], course: &Course, share: f64, of_dual: f64) -> Option<Vec<Bound>> {
+        let moved = |((bound, change), &c): ((&Bound, &Change), &f64)| {
             if self.is_inside {
                 bound.moved_inside(c, change, of_dual)
             } else {
@@ -312,11 +311,15 @@ impl<'a, O: Objective> Problem<'a, O> {
         self.bounds = bounds;
     }
 
-    /// The merit of `x` with these constraints; their own where none are given.
-    pub fn merit(&self, x: &[[f64; 2]], bounds: Option<&[Bound]>) -> Merit {
-        let bounds = bounds.unwrap_or(&self.bounds);
+    /// The merit of `x`, which has these quantities, with the problem's own constraints.
+    pub fn merit(&self, x: &[[f64; 2]], quantities: &[f64]) -> Merit {
+        self.merit_with(&self.bounds, x, quantities)
+    }
+
+    /// The merit of `x`, which has these quantities, with these constraints.
+    pub fn merit_with(&self, bounds: &[Bound], x: &[[f64; 2]], quantities: &[f64]) -> Merit {
         let (energy, mut distance, mut total) = (self.energy(x), 0.0, 0.0);
-        for (bound, c) in bounds.iter().zip(self.quantities(x)) {
+        for (bound, &c) in bounds.iter().zip(quantities) {
             distance += bound.cost * bound.residual(c).abs();
             total += bound.merit(c);
         }
