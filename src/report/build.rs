@@ -181,6 +181,7 @@ fn untangling(report: &untangle::Report, det_min: f64) -> Untangle {
         untangle::Method::Harmonic => "none",
         untangle::Method::Patch => "patch",
         untangle::Method::Feasible => "feasible",
+        untangle::Method::Isometric => "isometric",
         untangle::Method::Start => "start",
     };
     Untangle {
@@ -192,6 +193,7 @@ fn untangling(report: &untangle::Report, det_min: f64) -> Untangle {
         energy: report.energy,
         energy_excess: (report.energy - report.energy_unconstrained) / report.energy_unconstrained,
         gradient_norm: report.gradient_norm,
+        from_isometry: report.from_isometry.map(|from| super::FromIsometry { start: from.start, least: from.least }),
         det_min,
     }
 }

@@ -418,7 +418,7 @@ pub struct Quadratic {
 /// The untangling of a chart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Untangle {
-    /// `none` (the harmonic map was valid), `patch`, `feasible` or `start`.
+    /// `none` (the harmonic map was valid), `patch`, `feasible`, `isometric` or `start`.
     pub method: String,
     /// Newton steps.
     pub iterations: usize,
@@ -434,8 +434,19 @@ pub struct Untangle {
     pub energy_excess: f64,
     /// Norm of the last barrier problem's gradient, in its inverse Hessian, relative to the root of twice the energy.
     pub gradient_norm: f64,
+    /// How far maps inside the boundary are from an isometry, where the harmonic map was not wanted.
+    pub from_isometry: Option<FromIsometry>,
     /// Least jacobian determinant per unit of mollified area, of the result.
     pub det_min: f64,
+}
+
+/// Symmetric Dirichlet energies over that of an isometry.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FromIsometry {
+    /// Of the raised linear map.
+    pub start: f64,
+    /// The least that was found with that boundary.
+    pub least: f64,
 }
 
 /// The proof of a chart.

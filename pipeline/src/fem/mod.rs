@@ -14,6 +14,7 @@ pub mod bernstein;
 pub mod dofs;
 pub mod element;
 pub mod geometry;
+pub(crate) mod isotropic;
 pub(crate) mod jacobian;
 pub(crate) mod laplace;
 pub mod quadrature;

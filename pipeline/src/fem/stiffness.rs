@@ -58,12 +58,19 @@ pub fn stiffness_by_quadrature<E: Element<N> + ?Sized, const N: usize>(
 pub trait Triangles {
     /// The stiffness matrix of element `E` on a triangle.
     fn stiffness<E: Element<N>, const N: usize>(&self, face: usize) -> [[f64; N]; N];
+
+    /// The first fundamental form of a triangle at `l`.
+    fn metric(&self, face: usize, l: Barycentric) -> FirstForm;
 }
 
 /// Flat triangles.
 impl Triangles for [TriangleShape] {
     fn stiffness<E: Element<N>, const N: usize>(&self, face: usize) -> [[f64; N]; N] {
         E::stiffness(&self[face])
+    }
+
+    fn metric(&self, face: usize, _: Barycentric) -> FirstForm {
+        FirstForm::flat(&self[face])
     }
 }
 

@@ -8,7 +8,7 @@
 use super::elimination;
 use super::nodes::Nodes;
 use crate::atlas::Chart;
-use crate::fem::element::{Element, P2};
+use crate::fem::element::{Barycentric, Element, P2};
 use crate::fem::geometry::FirstForm;
 use crate::fem::quadrature::Rule;
 use crate::fem::stiffness::{Triangles, stiffness_by_quadrature};
@@ -235,10 +235,17 @@ impl Triangles for FilledChart {
     fn stiffness<E: Element<N>, const N: usize>(&self, face: usize) -> [[f64; N]; N] {
         match self.curved.get(face) {
             None => E::stiffness(&self.shapes[face]),
-            Some(nodes) => {
-                let metric = |l| FirstForm::of_nodes::<P2, 6>(nodes, l);
+            Some(_) => {
+                let metric = |l| self.metric(face, l);
                 stiffness_by_quadrature::<E, N>(metric, Rule::of_degree(degree_on_curved(E::ORDER)))
             }
+        }
+    }
+
+    fn metric(&self, face: usize, l: Barycentric) -> FirstForm {
+        match self.curved.get(face) {
+            None => FirstForm::flat(&self.shapes[face]),
+            Some(nodes) => FirstForm::of_nodes::<P2, 6>(nodes, l),
         }
     }
 }

@@ -141,14 +141,6 @@ pub(crate) fn conformal_p99_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [Gr
     p99
 }
 
-/// The largest conformal distortion of a triangle, by the nodes of each, without those that mollification changed.
-pub(crate) fn largest_conformal_of_nodes(chart: &Chart, nodes: impl Fn(usize) -> [GridPoint; 6]) -> f64 {
-    let distortion = |f: usize| conformal_distortion(chart, f, nodes(f).map(|n| n.uv()));
-    // Of more than all of the area: rounding does not pass the last one over.
-    let [largest] = conformal_quantiles(chart, distortion, [f64::INFINITY]);
-    largest
-}
-
 /// Quantiles of what `distortion` tells of each triangle of a chart, by area, without those whose shape mollification
 /// changed.
 fn conformal_quantiles<const N: usize>(chart: &Chart, distortion: impl Fn(usize) -> f64, shares: [f64; N]) -> [f64; N] {

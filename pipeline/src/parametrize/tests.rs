@@ -246,10 +246,12 @@ fn a_wall_of_long_facets_is_no_worse_than_the_map_that_untangling_starts_from() 
         assert_eq!(chart.provenance().boundary, BoundaryFound::Natural);
         let p99 = chart.distortion().conformal_p99;
         assert!(p99 < 4.0, "height {height}: {p99}");
-        // On the low one the harmonic map is valid. On the others what untangling makes of it is 71 to 178.
-        let method = chart.provenance().untangle.as_ref().map(|u| u.method);
-        let expected = if height == 1.0 { untangle::Method::Harmonic } else { untangle::Method::Start };
-        assert_eq!(method, Some(expected), "height {height}");
+        // On the low one the harmonic map is valid. On the others what untangling makes of it is 71 to 178, and what is nearest to
+        // an isometry is wanted.
+        let report = chart.provenance().untangle.as_ref().expect("quadratic");
+        let expected = if height == 1.0 { untangle::Method::Harmonic } else { untangle::Method::Isometric };
+        assert_eq!(report.method, expected, "height {height}");
+        assert!(report.from_isometry.is_none_or(|from| 1.0 < from.least && from.least < from.start), "{report:?}");
     }
 }
 
@@ -286,7 +288,10 @@ fn a_row_of_long_facets_is_refined_and_what_comes_of_it_is_the_same_surface() {
         |atlas: &CertifiedAtlas| atlas.charts().iter().map(|c| c.distortion().conformal_p99).fold(1.0, f64::max);
     let (coarse, fine) = (run(None), run(Some(4)));
     assert_eq!((coarse.mesh().triangles().len(), fine.mesh().default_size()), (108, coarse.mesh().default_size()));
-    assert!(invalid(&coarse) > 36 && invalid(&fine) == 0 && worst(&fine) < 1.2 * worst(&coarse));
+    // What stands in for the harmonic map before is stretched as little; that is no longer needed.
+    assert!(invalid(&coarse) > 36 && invalid(&fine) == 0 && worst(&fine) < 3.5);
+    let harmonic = |c: &CertifiedChart| c.provenance().untangle.as_ref().map(|u| u.method);
+    assert!(fine.charts().iter().all(|c| harmonic(c) == Some(untangle::Method::Harmonic)));
     assert!((200..=4 * 108).contains(&fine.mesh().triangles().len()));
     // Each triangle of the input is found again: its parts have its area, and its corners, and no other vertex of the input.
     let mesh = fine.mesh();

@@ -19,7 +19,7 @@ const KEPT: f64 = 1e-3;
 /// What triangles weigh at least, relative to the mean: where the objective is nothing a barrier is wanted all the same.
 const MIN_WEIGHT: f64 = 1e-6;
 
-/// Descends from `start`.
+/// Descends from `start`, the barrier at these shares of the objective in turn.
 ///
 /// # Errors
 /// [`Error`]: the systems are too large or cannot be factorised, or interrupted.
@@ -27,6 +27,7 @@ pub(super) fn untangle<O: Objective>(
     chart: &FilledChart,
     objective: &O,
     start: &[GridPoint],
+    shares: &[f64],
     stats: &mut Stats,
     checkpoint: &Checkpoint,
 ) -> Result<Vec<GridPoint>, Error> {
@@ -40,7 +41,7 @@ pub(super) fn untangle<O: Objective>(
         bound.scale = coefficient;
         bound.floor = KEPT * coefficient;
     });
-    descend(&mut problem, &mut x, stats)?;
+    descend(&mut problem, &mut x, shares, stats)?;
     for moved in problem.moved(&x) {
         all[moved.node] = moved.uv;
     }
@@ -94,13 +95,18 @@ fn problem<'a, O: Objective>(
 }
 
 /// Minimises from the start.
-fn descend<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &mut Stats) -> Result<(), Error> {
+fn descend<O: Objective>(
+    problem: &mut Problem<O>,
+    x: &mut [[f64; 2]],
+    shares: &[f64],
+    stats: &mut Stats,
+) -> Result<(), Error> {
     if problem.unknowns() == 0 {
         return Ok(());
     }
     let pattern = problem.pattern();
     problem.checkpoint()?;
     let analysis = pattern.analyse()?;
-    stats.add(minimise(problem, &analysis, x)?);
+    stats.add(minimise(problem, &analysis, x, shares)?);
     Ok(())
 }

@@ -25,7 +25,11 @@ const HALVINGS: u32 = 20;
 /// The barrier's weights: shares of what [`super::bound::Bound::weight`] is to begin with. The last one decides how close the
 /// result comes: with 55 invalid triangles of 1,076 the energy was 7.7009, 7.4736, 7.4626 and 7.4622 at 1e-4 to 1e-7, that of
 /// the harmonic map 7.4603.
-const WEIGHTS: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+pub(super) const WEIGHTS: [f64; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+
+/// The same for objectives that keep maps valid themselves, but for what lies between the points of a quadrature. Larger
+/// ones only lead away from where the objective is least: with all six the charts of cad_box_multi took twice as long.
+pub(super) const LAST_WEIGHTS: [f64; 2] = [1e-4, 1e-6];
 
 /// A weight but the last is left when what is promised falls below this share of the objective for each unit of it: the next one
 /// asks for more.
@@ -47,7 +51,7 @@ pub(super) struct Outcome {
     pub decrement: f64,
 }
 
-/// Minimises from `x`, whose weights are those of a barrier that counts as much as the objective. The penalised quantities of the
+/// Minimises from `x`, whose weights are those of a barrier that counts as much as the objective, by these shares of them in turn. The penalised quantities of the
 /// result are positive where there is a solution near by; whoever asks looks.
 ///
 /// # Errors
@@ -56,16 +60,17 @@ pub(super) fn minimise<O: Objective>(
     problem: &mut Problem<O>,
     analysis: &Analysis,
     x: &mut [[f64; 2]],
+    weights: &[f64],
 ) -> Result<Outcome, Error> {
     let mut outcome = Outcome::default();
     let mut last = 1.0;
-    for weight in WEIGHTS {
+    for &weight in weights {
         problem.scale_weights(weight / last);
         if last == 1.0 {
             problem.begin(x);
         }
         last = weight;
-        let is_last = Some(&weight) == WEIGHTS.last();
+        let is_last = Some(&weight) == weights.last();
         let tolerance = if is_last { TOLERANCE } else { LOOSE * weight };
         while outcome.iterations < STEPS && step(problem, analysis, x, tolerance, &mut outcome)? {}
     }

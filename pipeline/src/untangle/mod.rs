@@ -34,7 +34,8 @@ use crate::map::filled::FilledChart;
 use crate::map::quadratic::{self, QuadraticMap, invalid_triangles};
 use crate::monitor::{Checkpoint, Interrupted, Monitor};
 use crate::topology::FaceId;
-pub use objective::{Dirichlet, LocalModel, Objective};
+use interior::{LAST_WEIGHTS, WEIGHTS};
+pub use objective::{Dirichlet, Isometric, LocalModel, Objective};
 use patch::Stuck;
 
 /// Above this share of invalid triangles the feasible path is taken at once: patches would grow together. Patches were
@@ -50,8 +51,19 @@ pub enum Method {
     Patch,
     /// A barrier method from the degree-elevated linear map.
     Feasible,
+    /// From the degree-elevated linear map on, the symmetric Dirichlet energy was lowered ([`Isometric`]).
+    Isometric,
     /// The degree-elevated linear map itself.
     Start,
+}
+
+/// Symmetric Dirichlet energies over that of an isometry: 1 at least.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FromIsometry {
+    /// Of the start.
+    pub start: f64,
+    /// Of the map that minimises that energy inside the boundary.
+    pub least: f64,
 }
 
 /// What untangling did.
@@ -73,31 +85,30 @@ pub struct Report {
     /// The gradient of the last barrier problem in the norm of its inverse Hessian, relative to the root of twice
     /// the energy; the largest over all patches. Zero where nothing was minimised.
     pub gradient_norm: f64,
+    /// How far maps are from an isometry, where that was looked at: it is where the harmonic map is not what is wanted.
+    pub from_isometry: Option<FromIsometry>,
 }
 
 impl Report {
-    /// The report where the start itself is the result.
-    pub(crate) fn of_start(self, chart: &FilledChart, start: &[GridPoint], minimiser: &QuadraticMap) -> Self {
-        let nodes_moved = nodes_moved(chart, start, minimiser);
-        Self { method: Method::Start, nodes_moved, energy: self.energy_start, gradient_norm: 0.0, ..self }
-    }
-
-    /// The same where nothing else was tried.
-    pub(crate) fn of_start_alone<O: Objective>(
+    /// Of what [`descend`] found with another objective, if it is the result, or else of the start; energies are those of
+    /// `objective`.
+    pub(crate) fn of_other<O: Objective>(
         chart: &FilledChart,
         objective: &O,
         start: &[GridPoint],
         minimiser: &QuadraticMap,
+        descended: Option<&Descended>,
     ) -> Self {
-        let energy_start = total_on_grid(chart, objective, start);
+        let nodes = descended.map_or(start, |descended| &descended.nodes);
         Self {
-            method: Method::Start,
-            iterations: 0,
-            nodes_moved: nodes_moved(chart, start, minimiser),
+            method: if descended.is_some() { Method::Isometric } else { Method::Start },
+            iterations: descended.map_or(0, |descended| descended.iterations),
+            nodes_moved: nodes_moved(chart, nodes, minimiser),
             energy_unconstrained: total(chart, objective, minimiser.uv()),
-            energy_start,
-            energy: energy_start,
-            gradient_norm: 0.0,
+            energy_start: total_on_grid(chart, objective, start),
+            energy: total_on_grid(chart, objective, nodes),
+            gradient_norm: descended.map_or(0.0, |descended| descended.gradient_norm),
+            from_isometry: None,
         }
     }
 }
@@ -186,8 +197,89 @@ pub fn untangle<O: Objective>(
         energy_start: total_on_grid(chart, objective, start),
         energy: total_on_grid(chart, objective, &found.nodes),
         gradient_norm: stats.decrement.max(0.0).sqrt(),
+        from_isometry: None,
     };
     Ok(Untangled { nodes: found.nodes, hole_centres: found.hole_centres, report })
+}
+
+/// What [`descend`] found.
+#[derive(Clone, Debug)]
+pub struct Descended {
+    /// The uv of all nodes of the filled chart.
+    pub nodes: Vec<GridPoint>,
+    /// Per hole, a point from which its loop can be seen.
+    pub hole_centres: Vec<GridPoint>,
+    /// Newton steps.
+    pub iterations: usize,
+    /// The objective at the start.
+    pub energy_start: f64,
+    /// The objective at the result, no larger.
+    pub energy: f64,
+    /// As [`Report::gradient_norm`].
+    pub gradient_norm: f64,
+}
+
+/// Lowers `objective` from `start` on, a valid map, with its boundary fixed: by the feasible path of [`untangle`], for objectives
+/// that nothing but validity keeps from falling without end, or that have no value at invalid maps, as [`Isometric`]. The result
+/// is the start itself where nothing lower is found that is valid.
+///
+/// # Errors
+/// [`Interrupted`].
+///
+/// # Example
+///
+/// The inside of a chart, nearer to an isometry than the linear map, with the boundary where it is.
+///
+/// ```
+/// use planish_core::map::boundary::{Boundary, Mids};
+/// use planish_core::map::filled::FilledChart;
+/// use planish_core::map::linear::linear_map;
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::untangle::{Isometric, descend};
+/// use planish_core::{decompose, repair, shapes};
+///
+/// let mesh = repair(&shapes::disk(6), &Default::default())?.mesh;
+/// let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()])?;
+/// let chart = FilledChart::new(&atlas.charts()[0]);
+/// let boundary = Boundary::circle(&chart, Mids::Chord);
+/// let start = linear_map(&chart, &boundary, &NoMonitor)?.degree_elevated(&chart, &boundary);
+/// let nodes: Vec<_> = (0..chart.triangles().len()).map(|f| chart.nodes(f).map(|n| start[n].uv())).collect();
+/// let objective = Isometric::near(&chart, &nodes);
+/// let descended = descend(&chart, &objective, &start, &NoMonitor)?;
+/// assert!(descended.energy < descended.energy_start);
+/// // An isometry has the energy of its area.
+/// assert!(descended.energy > 0.99 * std::f64::consts::PI);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn descend<O: Objective>(
+    chart: &FilledChart,
+    objective: &O,
+    start: &[GridPoint],
+    monitor: &dyn Monitor,
+) -> Result<Descended, Interrupted> {
+    let mut stats = Stats::default();
+    let energy_start = total_on_grid(chart, objective, start);
+    let lower = match feasible::untangle(chart, objective, start, &LAST_WEIGHTS, &mut stats, &Checkpoint::new(monitor))
+    {
+        Ok(nodes) => {
+            let energy = total_on_grid(chart, objective, &nodes);
+            valid(chart, &nodes).filter(|_| energy < energy_start).map(|centres| (nodes, centres, energy))
+        }
+        Err(sparse::Error::Interrupted(interrupted)) => return Err(interrupted),
+        Err(sparse::Error::Unsolvable(_)) => None,
+    };
+    let iterations = stats.iterations;
+    Ok(match lower {
+        Some((nodes, hole_centres, energy)) => {
+            let gradient_norm = stats.decrement.max(0.0).sqrt();
+            Descended { nodes, hole_centres, iterations, energy_start, energy, gradient_norm }
+        }
+        None => {
+            let hole_centres = (0..chart.loops().len()).map(|k| start[chart.centre_node(k)]).collect();
+            let nodes = start.to_vec();
+            Descended { nodes, hole_centres, iterations, energy_start, energy: energy_start, gradient_norm: 0.0 }
+        }
+    })
 }
 
 /// The objective over all triangles, those of the fans included.
@@ -239,7 +331,7 @@ fn best<O: Objective>(
     }
     // Steps are counted over all paths, but accuracy is that of the path that is taken.
     stats.decrement = 0.0;
-    match feasible::untangle(chart, objective, start, stats, checkpoint) {
+    match feasible::untangle(chart, objective, start, &WEIGHTS, stats, checkpoint) {
         Ok(nodes) => {
             if let Some(found) = found_if_valid(Method::Feasible, nodes) {
                 return Ok(found);

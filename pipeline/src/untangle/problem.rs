@@ -240,8 +240,8 @@ impl<'a, O: Objective> Problem<'a, O> {
                 for (k, bound) in bounds.iter().enumerate() {
                     add_outer(&mut local, bound, dets[k], &corners.gradient(k));
                 }
-                keep_positive(&mut local.hessian);
             }
+            keep_positive(&mut local.hessian);
             pattern.add(&mut model.hessian, i, &local.hessian);
             self.scatter(&mut model.gradient, &cell.nodes, &local.gradient);
         }

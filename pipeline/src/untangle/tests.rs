@@ -60,7 +60,7 @@ fn a_bent_disk_is_untangled_close_to_the_harmonic_map_on_both_paths() {
     let mut stats = Stats::default();
     let nodes = {
         let energy = Dirichlet::new(&chart);
-        feasible::untangle(&chart, &energy, &start, &mut stats, &Checkpoint::new(&NoMonitor)).expect("small")
+        feasible::untangle(&chart, &energy, &start, &WEIGHTS, &mut stats, &Checkpoint::new(&NoMonitor)).expect("small")
     };
     assert!(valid(&chart, &nodes).is_some());
     // Patches alone come as close to the lower bound as the whole chart does.
@@ -141,7 +141,7 @@ fn a_valid_target_is_reached() {
     assert!(harmonic.invalid().is_empty());
     let distance = Distance { chart: &chart, target: harmonic.uv().to_vec() };
     let (mut stats, checkpoint) = (Stats::default(), Checkpoint::new(&NoMonitor));
-    let nodes = feasible::untangle(&chart, &distance, &start, &mut stats, &checkpoint).expect("small");
+    let nodes = feasible::untangle(&chart, &distance, &start, &WEIGHTS, &mut stats, &checkpoint).expect("small");
     let [before, after] = [&start, &nodes].map(|n| total_on_grid(&chart, &distance, n));
     assert!(after < 1e-9 * before, "{before} {after}");
 }
@@ -156,6 +156,34 @@ fn a_valid_minimiser_of_another_objective_is_the_result() {
     let minimiser = QuadraticMap::of(&chart, target, 0.0);
     let got = untangle(&chart, &distance, &start, &minimiser, &NoMonitor).expect("nobody interrupts");
     assert_eq!((got.report.method, got.report.energy, got.nodes), (Method::Harmonic, 0.0, start));
+}
+
+/// Begun at the linear map, no move of a few nodes brings what is found nearer to an isometry.
+#[test]
+fn the_isometric_objective_comes_to_rest_inside_the_valid_maps() {
+    let (chart, start, harmonic) = prepared(&shapes::bent_disk(8, 0.45, 1.0));
+    assert!(!harmonic.invalid().is_empty());
+    let nodes_of = |nodes: &[GridPoint]| -> Vec<P2Nodes> {
+        (0..chart.triangles().len()).map(|f| chart.nodes(f).map(|n| nodes[n].uv())).collect()
+    };
+    let objective = Isometric::near(&chart, &nodes_of(&start));
+    let got = descend(&chart, &objective, &start, &NoMonitor).expect("nobody interrupts");
+    assert!(valid(&chart, &got.nodes).is_some());
+    assert_eq!(got.energy_start, total_on_grid(&chart, &objective, &start));
+    assert_eq!(got.energy, total_on_grid(&chart, &objective, &got.nodes));
+    let least = objective.of_isometry(chart.shapes().iter().map(|s| s.area()).sum());
+    assert!(least < got.energy && got.energy < 0.9 * got.energy_start, "{least} {} {}", got.energy, got.energy_start);
+    assert!(got.gradient_norm <= 1e-5 && got.iterations < 80, "{} {}", got.gradient_norm, got.iterations);
+    let is_outer = chart.outer_nodes();
+    let mut random = shapes::Random(11);
+    for _ in 0..50 {
+        let mut moved = uv_of(&got.nodes, &[]);
+        for (p, _) in moved.iter_mut().zip(&is_outer).filter(|(_, is_outer)| !**is_outer) {
+            *p = p.map(|c| c + 1e-5 * random.symmetric());
+        }
+        let gained = got.energy - total(&chart, &objective, &moved);
+        assert!(gained < 1e-5 * got.energy, "{gained}");
+    }
 }
 
 #[test]

@@ -11,11 +11,11 @@
 //! sheet is at rest. Nor is the share: while a map is far from an isometry, lengths in space say little of those in the
 //! plane. Loops that cross are not told from others by this: see [`Clearance::is_kept`].
 
-use super::isotropic::Local;
 use super::{Around, RADIUS};
 use crate::atlas::Chart;
 use crate::certify::polygons;
 use crate::evaluate::Bvh;
+use crate::fem::isotropic::Local;
 use crate::grid::GridPoint;
 use crate::topology::HalfEdgeId;
 use crate::vec3::{BoundingBox, Vec3, norm};
@@ -115,7 +115,7 @@ impl Clearance {
     }
 
     /// Gradient and Hessian of the barrier of what is `near`. The concave part, by which a direction turns, is dropped.
-    pub fn local(&self, near: &Near, uv: &[[f64; 2]]) -> Local {
+    pub fn local(&self, near: &Near, uv: &[[f64; 2]]) -> Local<6> {
         let [v, a, b] = near.vertices.map(|v| uv[v]);
         let foot = foot(v, [a, b]);
         let distance = length(foot.from);

@@ -1,8 +1,9 @@
 //! Newton steps down an energy of a P1 map, with a positive Hessian, and a line search.
 
 use super::clearance::{Barrier, Near};
-use super::isotropic::{Density, Elements, Local};
+use super::elements::Elements;
 use crate::fem::dofs::Dofs;
+use crate::fem::isotropic::{Density, Local};
 use crate::fem::sparse::{self, Pattern, Unsolvable};
 use crate::monitor::{Checkpoint, Monitor};
 
@@ -162,7 +163,7 @@ impl Descent<'_> {
 
 impl Model {
     /// Adds the contribution of an element, by its number in `pattern` and its unknowns.
-    fn add(&mut self, pattern: &Pattern, number: usize, unknowns: &[u32; 6], local: &Local) {
+    fn add(&mut self, pattern: &Pattern, number: usize, unknowns: &[u32; 6], local: &Local<6>) {
         pattern.add(&mut self.hessian, number, &local.hessian);
         for (unknown, slope) in unknowns.iter().zip(local.gradient) {
             // What is prescribed has no entry.

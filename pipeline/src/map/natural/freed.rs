@@ -14,9 +14,10 @@
 
 use super::clearance::{Barrier, Clearance};
 use super::descent::Descent;
-use super::isotropic::{Elements, SymmetricDirichlet};
+use super::elements::Elements;
 use crate::atlas::Chart;
 use crate::fem::dofs::Dofs;
+use crate::fem::isotropic::SymmetricDirichlet;
 use crate::fem::sparse;
 use crate::monitor::Monitor;
 

@@ -5,9 +5,10 @@
 //! energy.
 
 use super::descent::Descent;
-use super::isotropic::{Elements, Regularised, SymmetricDirichlet};
+use super::elements::Elements;
 use crate::atlas::Chart;
 use crate::fem::dofs::Dofs;
+use crate::fem::isotropic::{Regularised, SymmetricDirichlet};
 use crate::fem::sparse;
 use crate::monitor::Monitor;
 
