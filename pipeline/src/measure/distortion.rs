@@ -120,8 +120,9 @@ fn stretch_at(corners: [[f64; 2]; 3], x: &P2Nodes, l: Barycentric) -> f64 {
 /// The ratio of the singular values of a matrix, by its columns and its determinant.
 pub(crate) fn singular_ratio(first: [f64; 2], second: [f64; 2], det: f64) -> f64 {
     // |f_z| + |f_conj z| is the larger singular value, and the determinant the product of both.
-    let doubled_f_z = (first[0] + second[1]).hypot(first[1] - second[0]);
-    let doubled_f_conj_z = (first[0] - second[1]).hypot(first[1] + second[0]);
+    let length = |x: f64, y: f64| (x * x + y * y).sqrt();
+    let doubled_f_z = length(first[0] + second[1], first[1] - second[0]);
+    let doubled_f_conj_z = length(first[0] - second[1], first[1] + second[0]);
     let largest = 0.5 * (doubled_f_z + doubled_f_conj_z);
     largest * largest / det
 }

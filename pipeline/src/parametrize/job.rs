@@ -22,6 +22,7 @@ use crate::settings::{BoundaryShape, ChartSettings, Order, OutOfRange};
 use crate::topology::FaceId;
 use crate::untangle::{self, Dirichlet, FromIsometry, Isometric, Objective, Untangled, descend, untangle};
 use std::cell::LazyCell;
+use std::sync::OnceLock;
 
 /// A chart that is to be mapped, and what its map depends on: a value of its own, which needs neither the surface nor the
 /// other charts, and so can be done anywhere.
@@ -79,6 +80,14 @@ pub(super) struct Maps {
     pub(super) certified_start: CertifiedMap,
     harmonic: Option<Result<QuadraticMap, sparse::Unsolvable>>,
     pub(super) boundary: BoundaryFound,
+    p99: Quantiles,
+}
+
+/// Conformal distortions that 99 % of the area do not exceed, once they were asked for.
+#[derive(Clone, Debug, Default)]
+struct Quantiles {
+    of_start: OnceLock<f64>,
+    of_harmonic: OnceLock<f64>,
 }
 
 impl Maps {
@@ -86,25 +95,34 @@ impl Maps {
     /// there is one (untangling changes it little, and takes long where it is large), for others in the linear map, its degree
     /// elevated. Noise makes many triangles of harmonic maps invalid, and such a chart is not the better for being cut.
     pub(super) fn conformal_p99(&self, chart: &Chart) -> f64 {
-        let nodes = match &self.harmonic {
-            Some(Ok(map)) if !chart.holes().is_empty() && !self.boundary.is_own() => map.nodes(),
-            _ => &self.start,
-        };
-        distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]))
+        match &self.harmonic {
+            Some(Ok(map)) if !chart.holes().is_empty() && !self.boundary.is_own() => self.p99_of_harmonic(chart, map),
+            _ => self.p99_of_start(chart),
+        }
     }
 
     /// The same, as it is to be expected when the map is untangled, with holes or without: that of the harmonic map, and where
     /// that is invalid on a hundredth of the area, more than that of the linear map.
     pub(super) fn expected_p99(&self, chart: &Chart) -> f64 {
-        let of_nodes =
-            |nodes: &[GridPoint]| distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]));
         match &self.harmonic {
             Some(Ok(map)) => {
-                let of_harmonic = of_nodes(map.nodes());
-                if of_harmonic < f64::MAX { of_harmonic } else { UNTANGLED * of_nodes(&self.start) }
+                let of_harmonic = self.p99_of_harmonic(chart, map);
+                if of_harmonic < f64::MAX { of_harmonic } else { UNTANGLED * self.p99_of_start(chart) }
             }
-            Some(Err(_)) | None => of_nodes(&self.start),
+            Some(Err(_)) | None => self.p99_of_start(chart),
         }
+    }
+
+    fn p99_of_start(&self, chart: &Chart) -> f64 {
+        *self.p99.of_start.get_or_init(|| self.p99_of_nodes(chart, &self.start))
+    }
+
+    fn p99_of_harmonic(&self, chart: &Chart, map: &QuadraticMap) -> f64 {
+        *self.p99.of_harmonic.get_or_init(|| self.p99_of_nodes(chart, map.nodes()))
+    }
+
+    fn p99_of_nodes(&self, chart: &Chart, nodes: &[GridPoint]) -> f64 {
+        distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| nodes[n]))
     }
 
     /// Per triangle of the chart, the share of energy that a bisection would save; nothing where there is no harmonic map.
@@ -117,7 +135,7 @@ impl Maps {
 
     /// What the map of a finer chart inherits, whose vertices lie at `uv` in the linear map.
     pub(super) fn inherited(&self, chart: &Chart, uv: impl FnOnce(&[GridPoint]) -> Vec<GridPoint>) -> Inherited {
-        let conformal_p99 = distortion::conformal_p99_of_nodes(chart, |f| self.filled.nodes(f).map(|n| self.start[n]));
+        let conformal_p99 = self.p99_of_start(chart);
         let uv = self.boundary.is_own().then(|| uv(&self.linear.uv()[..self.filled.chart_vertices()]));
         Inherited { boundary: self.boundary, uv, method: self.linear.method(), conformal_p99 }
     }
@@ -518,13 +536,14 @@ struct FeasibleStart {
     nodes: Vec<GridPoint>,
     certified: CertifiedMap,
     found: BoundaryFound,
+    p99: OnceLock<f64>,
 }
 
 impl FeasibleStart {
     /// A start with a boundary that is not on the circle.
     fn off_circle(start: NaturalStart, found: BoundaryFound) -> Self {
-        let NaturalStart { filled, boundary, linear, nodes, certified, .. } = start;
-        Self { filled, boundary, linear, nodes, certified, found }
+        let NaturalStart { filled, boundary, linear, nodes, certified, conformal_p99 } = start;
+        Self { filled, boundary, linear, nodes, certified, found, p99: conformal_p99.into() }
     }
 
     /// All maps with this boundary, however they scale areas: that was looked at when it was chosen.
@@ -568,7 +587,8 @@ impl FeasibleStart {
         let hole_centres = (0..filled.loops().len()).map(|k| nodes[filled.centre_node(k)]).collect();
         let certified = prove(planar(&filled, &nodes, hole_centres)).map_err(MapError::Start)?;
         checkpoint.after(triangles)?;
-        Ok(Self { filled, boundary, linear, nodes, certified, found: BoundaryFound::Circle { why_none } })
+        let found = BoundaryFound::Circle { why_none };
+        Ok(Self { filled, boundary, linear, nodes, certified, found, p99: OnceLock::new() })
     }
 
     /// Refuses a chart whose area `ratio` is above `bound`, with the scales that show where to split it.
@@ -580,8 +600,9 @@ impl FeasibleStart {
     }
 
     fn with_harmonic(self, harmonic: Option<Result<QuadraticMap, sparse::Unsolvable>>) -> Maps {
-        let Self { filled, linear, nodes, certified, found, .. } = self;
-        Maps { filled, linear, start: nodes, certified_start: certified, harmonic, boundary: found }
+        let Self { filled, linear, nodes, certified, found, p99, .. } = self;
+        let p99 = Quantiles { of_start: p99, of_harmonic: OnceLock::new() };
+        Maps { filled, linear, start: nodes, certified_start: certified, harmonic, boundary: found, p99 }
     }
 }
 
@@ -614,7 +635,7 @@ fn untangle_and_certify(
     max_area_ratio: f64,
     monitor: &dyn Monitor,
 ) -> Result<ProvenMap, Interrupted> {
-    let Maps { filled, linear, start, certified_start, harmonic, boundary } = maps;
+    let Maps { filled, linear, start, certified_start, harmonic, boundary, p99: known } = maps;
     let linear =
         LinearSummary { folded: linear.folded(), edges_changed: linear.edges_changed(), method: linear.method() };
     let (harmonic, unsolved) = match harmonic {
@@ -641,6 +662,12 @@ fn untangle_and_certify(
             untangled <= UNFOLLOWED || p99(&certified_start) > HALVED * untangled
         }
     };
+    // That of the harmonic map is known, as a rule, where that is valid.
+    let is_followed = |report: &untangle::Report| {
+        report.method == untangle::Method::Harmonic
+            && boundary == BoundaryFound::Natural
+            && known.of_harmonic.get().is_some_and(|p99| *p99 <= UNFOLLOWED)
+    };
     let energy = Dirichlet::new(&filled);
     let mut steps = 0;
     // What is near an isometry is not near the harmonic map: of 40 freed charts of nine files none that was untangled stretched less
@@ -648,7 +675,7 @@ fn untangle_and_certify(
     if !matches!(boundary, BoundaryFound::Freed { .. }) || map.invalid().is_empty() {
         let Untangled { nodes, hole_centres, report } = untangle(&filled, &energy, &start, &map, monitor)?;
         Checkpoint::new(monitor).end()?;
-        if let Some(certified) = proven(&nodes, hole_centres).filter(is_wanted) {
+        if let Some(certified) = proven(&nodes, hole_centres).filter(|map| is_followed(&report) || is_wanted(map)) {
             let provenance = Provenance { boundary, linear, harmonic, untangle: Some(report), unsolved };
             return Ok(ProvenMap { map: certified, start: certified_start, provenance });
         }

@@ -25,8 +25,9 @@ pub(super) type Polygon = Vec<[f64; 2]>;
 
 /// A chart as it is laid out.
 pub(super) struct Flattened {
-    /// The outer loop, then those of the holes; none where lengths would not stay positive. They need not be simple.
-    pub loops: Option<Vec<Polygon>>,
+    /// Per vertex its place, harmonic inside the loops; none where lengths would not stay positive. Loops need not be simple, and
+    /// what is inside may fold.
+    pub uv: Option<Vec<[f64; 2]>>,
     /// The area ratio of the conformal map, as far as the scale tells it.
     pub area_ratio: f64,
 }
@@ -61,7 +62,7 @@ pub(super) fn boundary_first(
     let placed = loops.and_then(|loops| placed(chart, &laplacian, &factor, loops));
     drop(factor);
     checkpoint.end()?;
-    Ok(flat.map(|flat| Flattened { loops: placed, area_ratio: flat.area_ratio(chart) }))
+    Ok(flat.map(|flat| Flattened { uv: placed, area_ratio: flat.area_ratio(chart) }))
 }
 
 /// The metric of the plane on a chart.
@@ -192,12 +193,18 @@ mod tests {
     use crate::monitor::NoMonitor;
     use crate::{decompose, repair, shapes};
 
+    /// The places of the vertices of all loops, in their order.
+    fn along_loops(chart: &Chart, flat: Flattened) -> Vec<[f64; 2]> {
+        let uv = flat.uv.expect("closes");
+        chart.boundary().map(|h| uv[chart.from(h).index()]).collect()
+    }
+
     fn polygon_of(soup: &crate::mesh::TriangleSoup) -> (Chart, Vec<[f64; 2]>) {
         let mesh = repair(soup, &Default::default()).expect("a surface").mesh;
         let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk");
         let chart = atlas.into_charts().remove(0);
         let flat = boundary_first(&chart, &FilledChart::open(&chart), &NoMonitor).expect("solves").expect("few holes");
-        let polygon = flat.loops.expect("closes").remove(0);
+        let polygon = along_loops(&chart, flat);
         (chart, polygon)
     }
 
@@ -248,10 +255,10 @@ mod tests {
             let chart = atlas.into_charts().remove(0);
             let flat =
                 boundary_first(&chart, &FilledChart::open(&chart), &NoMonitor).expect("solves").expect("few holes");
-            let at: Vec<[f64; 2]> =
-                flat.loops.expect("closes").concat().iter().map(|p| p.map(|c| c / chart.scale())).collect();
+            let area_ratio = flat.area_ratio;
+            let at: Vec<[f64; 2]> = along_loops(&chart, flat).iter().map(|p| p.map(|c| c / chart.scale())).collect();
             let points: Vec<_> = chart.boundary().map(|h| chart.points()[chart.from(h).index()]).collect();
-            (at, points, flat.area_ratio)
+            (at, points, area_ratio)
         });
         assert!(flat.2 < 1.0 + 1e-9 && rolled.2 < 1.02, "{} {}", flat.2, rolled.2);
         for i in 0..flat.0.len() {

@@ -127,14 +127,22 @@ fn fitted(uv: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
     around.scaled(uv, RADIUS / around.half_diagonal())
 }
 
-/// Places of vertices of `chart`, whose triangles have the area `in_plane` there: turned to lie straight, moved and scaled
-/// into that disk, and so that lengths there and in space differ by a power of two, on the mean; none where they all are
-/// one, or not finite, or the triangles have no area.
-fn fitted_to_size(chart: &Chart, in_plane: f64, mut uv: Vec<[f64; 2]>) -> Option<Vec<[f64; 2]>> {
+/// Places of the vertices of `chart`, whose triangles have the area `in_plane` there: turned so that their `outline`, some of them,
+/// lies straight, moved and scaled so that it lies in that disk, and so that lengths there and in space differ by a power of
+/// two, on the mean; none where they all are one, or not finite, or the triangles have no area.
+fn fitted_to_size(
+    chart: &Chart,
+    in_plane: f64,
+    mut outline: Vec<[f64; 2]>,
+    mut uv: Vec<[f64; 2]>,
+) -> Option<Vec<[f64; 2]>> {
     let in_space = chart.shapes().iter().map(|s| s.area()).sum::<f64>();
     let to_size = (in_space / in_plane).sqrt();
-    upright::upright(&mut uv);
-    let around = Around::of(&uv);
+    if let Some(longer) = upright::longer_side(&outline) {
+        upright::turn(&mut outline, longer);
+        upright::turn(&mut uv, longer);
+    }
+    let around = Around::of(&outline);
     // The unit of the shapes is a power of two times that of the input.
     let halvings = (to_size * around.half_diagonal() / RADIUS).log2().ceil();
     around.scaled(&uv, to_size * (-halvings).exp2())

@@ -23,14 +23,14 @@ struct Harmonic {
     fluxes: [Vec<f64>; 2],
 }
 
-/// The loops, the first of which lies where it is to lie, with the others turned, scaled and moved to their places; none where
-/// the equations are singular in doubles.
+/// That map, per vertex: the first loop lies where it is to lie, the others are turned, scaled and moved to their places, and
+/// what is inside is harmonic. None where the equations are singular in doubles.
 pub(super) fn placed(
     chart: &Chart,
     laplacian: &Laplacian,
     factor: &Option<Factor>,
     mut polygons: Vec<Polygon>,
-) -> Option<Vec<Polygon>> {
+) -> Option<Vec<[f64; 2]>> {
     let extended = |boundary_loop: &[HalfEdgeId], at: &dyn Fn(usize) -> [f64; 2]| {
         let values = [0, 1].map(|part| {
             let mut values = vec![0.0; chart.vertices().len()];
@@ -73,12 +73,15 @@ pub(super) fn placed(
         }
     }
     let found = dense::solve(equations)?;
-    for (polygon, by) in polygons[1..].iter_mut().zip(found.chunks_exact(4)) {
-        for p in polygon.iter_mut() {
-            *p = [by[0] * p[0] - by[1] * p[1] + by[2], by[1] * p[0] + by[0] * p[1] + by[3]];
+    let [x, y] = &outer.values;
+    let mut uv: Vec<[f64; 2]> = x.iter().zip(y).map(|(x, y)| [*x, *y]).collect();
+    for (function, by) in functions.iter().zip(found.chunks_exact(2)) {
+        let [x, y] = &function.values;
+        for (p, (x, y)) in uv.iter_mut().zip(x.iter().zip(y)) {
+            *p = [p[0] + by[0] * x - by[1] * y, p[1] + by[1] * x + by[0] * y];
         }
     }
-    Some(polygons)
+    Some(uv)
 }
 
 /// The integral of grad of the conjugate of f times grad g.

@@ -13,7 +13,7 @@ use super::projection::projected;
 use super::unfolded::unfolded;
 use super::{EVEN, STEEP, conformal_by_corners, fitted_to_size, spectral_conformal, summary};
 use crate::atlas::Chart;
-use crate::certify::{self, CertifiedMap, PlanarMap, prove};
+use crate::certify::{self, CertifiedMap, PlanarMap, polygons, prove};
 use crate::fem::sparse;
 use crate::grid::GridPoint;
 use crate::map::boundary::Boundary;
@@ -43,7 +43,7 @@ pub struct NaturalStart {
 /// Why a chart has no map with a natural boundary.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoNatural {
-    /// The conformal map folds, and so does every linear map that was tried inside its boundary.
+    /// The conformal map folds, and so does every linear map that was tried inside its boundary, which does not cross itself.
     #[error("{triangles} triangles fold inside the natural boundary")]
     Folded {
         /// How many triangles the conformal map folds.
@@ -103,12 +103,13 @@ pub fn natural_start(
 ) -> Result<Result<NaturalStart, NoNatural>, Interrupted> {
     let search = Search { chart, filled: FilledChart::open(chart), most: max_area_ratio, monitor };
     let mut why = NoNatural::Unsolvable;
-    // What is told is why the best one failed.
+    // What is told is why the best one failed; that maps fold inside of loops that are simple, where there are such loops.
     for (rank, candidate) in Candidate::ALL.into_iter().enumerate() {
         Checkpoint::new(monitor).end()?;
         match search.by(candidate)? {
             Ok(start) => return Ok(Ok(start)),
             Err(Some(reason)) if rank == 0 || why == NoNatural::Unsolvable => why = reason,
+            Err(Some(reason @ NoNatural::Folded { .. })) if why == NoNatural::Crossing => why = reason,
             Err(_) => {}
         }
         // What a conformal map shrinks by Liouville's equation every other shrinks, too.
@@ -215,7 +216,7 @@ pub fn freed_start(
 ) -> Result<Option<NaturalStart>, Interrupted> {
     let uv = on_disk[..chart.vertices().len()].iter().map(|p| p.uv()).collect();
     let Some(uv) = solved(freed(chart, uv, monitor))? else { return Ok(None) };
-    let Some(Places::All(uv, _)) = Places::All(uv, Method::Isometric).fitted(chart) else { return Ok(None) };
+    let Some(uv) = Places::All(uv, Method::Isometric).fitted(chart).map(Places::into_uv) else { return Ok(None) };
     let search = Search { chart, filled: FilledChart::open(chart), most: max_area_ratio, monitor };
     let vertices: Vec<GridPoint> = uv.into_iter().map(GridPoint::vertex).collect();
     let boundary = Boundary::chords(&search.filled, |v| vertices[v.index()]);
@@ -287,7 +288,7 @@ impl Search<'_> {
                 Ok(Some(flat)) if flat.area_ratio > HOPELESS * self.most => {
                     return Ok(Err(Some(NoNatural::Uneven { ratio: flat.area_ratio })));
                 }
-                Ok(flat) => Ok(flat.and_then(|flat| flat.loops).map(Places::Boundary)),
+                Ok(flat) => Ok(flat.and_then(|flat| flat.uv).map(Places::Flattened)),
                 Err(error) => Err(error),
             },
             Candidate::Spectral => {
@@ -314,22 +315,20 @@ impl Search<'_> {
     /// The start with the boundary at these places.
     fn within(&self, places: Places) -> Result<Found, Interrupted> {
         let Self { chart, filled, monitor, .. } = self;
-        let is_flattened = matches!(places, Places::Boundary(_));
-        let (boundary, linear) = match places {
-            Places::Boundary(polygons) => {
-                let boundary = Boundary::chords(filled, on_loop(chart, polygons));
-                let linear = linear_map(filled, &boundary, *monitor);
-                (boundary, linear)
-            }
-            Places::All(uv, method) => {
-                let vertices: Vec<GridPoint> = uv.into_iter().map(GridPoint::vertex).collect();
-                let boundary = Boundary::chords(filled, |v| vertices[v.index()]);
-                let linear = match LinearMap::through(filled, vertices, method) {
-                    Err(linear::Error::Folded { .. }) => linear_map(filled, &boundary, *monitor),
-                    found => found,
-                };
-                (boundary, linear)
-            }
+        let is_flattened = matches!(places, Places::Flattened(_));
+        let method = places.method();
+        let vertices: Vec<GridPoint> = places.into_uv().into_iter().map(GridPoint::vertex).collect();
+        let boundary = Boundary::chords(filled, |v| vertices[v.index()]);
+        let polygons: Vec<Vec<GridPoint>> =
+            chart.loops().map(|l| l.iter().map(|h| vertices[chart.from(*h).index()]).collect()).collect();
+        // Inside such loops no map is one-to-one, and it takes long to try all weights.
+        if polygons::check(&polygons).is_some() {
+            return Ok(Err(Some(NoNatural::Crossing)));
+        }
+        Checkpoint::new(*monitor).end()?;
+        let linear = match LinearMap::through(filled, vertices, method) {
+            Err(linear::Error::Folded { .. }) => linear_map(filled, &boundary, *monitor),
+            found => found,
         };
         match linear {
             Ok(linear) => self.proven(boundary, linear, is_flattened),
@@ -391,11 +390,9 @@ impl Search<'_> {
     fn unfolded(&self, candidate: Candidate) -> Result<Option<NaturalStart>, Interrupted> {
         let Self { chart, filled, monitor, .. } = self;
         let Ok(places) = self.places(candidate)? else { return Ok(None) };
-        let is_flattened = matches!(places, Places::Boundary(_));
-        let boundary = match places {
-            Places::Boundary(polygons) => Boundary::chords(filled, on_loop(chart, polygons)),
-            Places::All(uv, _) => Boundary::chords(filled, |v| GridPoint::vertex(uv[v.index()])),
-        };
+        let is_flattened = matches!(places, Places::Flattened(_));
+        let at = places.into_uv();
+        let boundary = Boundary::chords(filled, |v| GridPoint::vertex(at[v.index()]));
         let mut uv = match harmonic_uv(filled, &boundary, *monitor) {
             Ok(uv) => uv,
             Err(linear::Error::Interrupted(interrupted)) => return Err(interrupted),
@@ -416,34 +413,38 @@ impl Search<'_> {
     }
 }
 
-/// Per vertex of the loops of a chart its place, given in their order.
-fn on_loop(chart: &Chart, polygons: Vec<Polygon>) -> impl Fn(VertexId) -> GridPoint {
-    let mut at = vec![GridPoint::default(); chart.vertices().len()];
-    for (h, uv) in chart.boundary().zip(polygons.into_iter().flatten()) {
-        at[chart.from(h).index()] = GridPoint::vertex(uv);
-    }
-    move |v| at[v.index()]
-}
-
-/// Places in the plane.
+/// Places of the vertices in the plane.
 enum Places {
-    /// Of the vertices of the outer loop, in its order, then of those of the holes.
-    Boundary(Vec<Polygon>),
-    /// Of all vertices, and how they were found.
+    /// Flattened boundary first, harmonic inside.
+    Flattened(Vec<[f64; 2]>),
+    /// By another method.
     All(Vec<[f64; 2]>, Method),
 }
 
 impl Places {
+    fn method(&self) -> Method {
+        match self {
+            Self::Flattened(_) => Method::Harmonic,
+            Self::All(_, method) => *method,
+        }
+    }
+
+    fn into_uv(self) -> Vec<[f64; 2]> {
+        match self {
+            Self::Flattened(uv) | Self::All(uv, _) => uv,
+        }
+    }
+
     /// Turned, moved and scaled so that they fit.
     fn fitted(self, chart: &Chart) -> Option<Self> {
         Some(match self {
-            // The area inside the outer polygon and outside the others is that of all triangles.
-            Self::Boundary(polygons) => {
+            // The area inside the outer polygon and outside the others is that of all triangles. What is harmonic inside may fold,
+            // and go beyond.
+            Self::Flattened(uv) => {
+                let loops = chart.loops().map(|boundary_loop| boundary_loop.iter().map(|h| uv[chart.from(*h).index()]));
+                let polygons: Vec<Polygon> = loops.map(Iterator::collect).collect();
                 let area = 0.5 * polygons.iter().map(|polygon| doubled_area(polygon)).sum::<f64>();
-                let fitted = fitted_to_size(chart, area, polygons.concat())?;
-                let mut rest = &fitted[..];
-                let take = |polygon: &Polygon| rest.split_off(..polygon.len()).map(<[_]>::to_vec);
-                Self::Boundary(polygons.iter().map(take).collect::<Option<_>>()?)
+                Self::Flattened(fitted_to_size(chart, area, polygons.concat(), uv)?)
             }
             Self::All(uv, method) => {
                 let doubled = |t: &[VertexId; 3]| {
@@ -451,7 +452,7 @@ impl Places {
                     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
                 };
                 let area = 0.5 * chart.triangles().iter().map(doubled).sum::<f64>();
-                Self::All(fitted_to_size(chart, area, uv)?, method)
+                Self::All(fitted_to_size(chart, area, uv.clone(), uv)?, method)
             }
         })
     }

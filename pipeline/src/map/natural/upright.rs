@@ -4,10 +4,10 @@
 /// looked at as a whole.
 const PAIRS: usize = 4_000_000;
 
-/// Turns points so that the smallest rectangle around them has its longer side along u. (One side of such a rectangle lies
+/// The direction of the longer side of the smallest rectangle around points; none where they have none. (One side of such a rectangle lies
 /// on a side of the convex hull: Freeman and Shapira 1975, *Determining the minimum-area encasing rectangle for an
 /// arbitrary closed curve*, doi 10.1145/360881.360919.)
-pub(super) fn upright(points: &mut [[f64; 2]]) {
+pub(super) fn longer_side(points: &[[f64; 2]]) -> Option<[f64; 2]> {
     let hull = convex_hull(points);
     let step = (hull.len() * hull.len()).div_ceil(PAIRS).max(1);
     let mut best: Option<(f64, [f64; 2])> = None;
@@ -26,7 +26,11 @@ pub(super) fn upright(points: &mut [[f64; 2]]) {
             best = Some((width * height, longer));
         }
     }
-    let Some((_, [cos, sin])) = best else { return };
+    best.map(|(_, longer)| longer)
+}
+
+/// Turns points so that a direction lies along u.
+pub(super) fn turn(points: &mut [[f64; 2]], [cos, sin]: [f64; 2]) {
     for p in points {
         *p = [cos * p[0] + sin * p[1], cos * p[1] - sin * p[0]];
     }
@@ -81,6 +85,12 @@ fn half_of_hull<'a>(sorted: impl Iterator<Item = &'a [f64; 2]>) -> Vec<[f64; 2]>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn upright(points: &mut [[f64; 2]]) {
+        if let Some(longer) = longer_side(points) {
+            turn(points, longer);
+        }
+    }
 
     #[test]
     fn a_turned_rectangle_is_laid_straight_with_its_longer_side_along_u() {
