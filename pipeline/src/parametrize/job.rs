@@ -145,13 +145,17 @@ impl Maps {
         self.filled.shapes()[..self.filled.chart_triangles()].iter().map(|shape| shape.longest()).collect()
     }
 
-    /// The share of the chart's triangles that are invalid in its harmonic map; 0 where there is none.
-    pub(super) fn invalid_share(&self, chart: &Chart) -> f64 {
-        let invalid = match &self.harmonic {
+    /// How many of the chart's triangles are invalid in its harmonic map; 0 where there is none.
+    pub(super) fn invalid(&self) -> usize {
+        match &self.harmonic {
             Some(Ok(map)) => map.invalid().len(),
             _ => 0,
-        };
-        invalid as f64 / chart.triangles().len() as f64
+        }
+    }
+
+    /// Their share.
+    pub(super) fn invalid_share(&self, chart: &Chart) -> f64 {
+        self.invalid() as f64 / chart.triangles().len() as f64
     }
 }
 
