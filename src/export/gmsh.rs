@@ -148,11 +148,11 @@ fn stretches(certified: &CertifiedChart, linear: &LinearAtlas, distortion: &Summ
     }
     let is_quick = area_of(chart) < QUICK * size * size && distortion.area_ratio < EVEN;
     let is_straight = linear.straight_charts().binary_search(&chart.id()).is_ok();
-    let is_rough = |method| matches!(method, untangle::Method::Start | untangle::Method::Isometric);
-    let is_start = certified.provenance().untangle.as_ref().is_some_and(|u| is_rough(u.method));
+    let is_harmonic = |method| !matches!(method, untangle::Method::Start | untangle::Method::Isometric);
+    let is_harmonic = certified.provenance().untangle.as_ref().is_none_or(|u| is_harmonic(u.method));
     let most = match certified.provenance().boundary {
         _ if is_straight || !is_quick => STRETCHED,
-        BoundaryFound::Natural if !is_start => STRETCHED,
+        BoundaryFound::Natural if is_harmonic => STRETCHED,
         BoundaryFound::Natural | BoundaryFound::Freed { .. } => OPENED,
         BoundaryFound::Circle { .. } => BENT,
     };

@@ -234,16 +234,25 @@ impl<const N: usize> Point<N> {
     }
 }
 
-/// The factor by which a map is to be scaled for the least symmetric Dirichlet energy: of points with the places of their
-/// nodes, at all of which it turns left. Where it does not, it may be no number.
-pub(crate) fn best_scale<const N: usize>(points: impl Iterator<Item = (Point<N>, [[f64; 2]; N])>) -> f64 {
-    let (mut direct, mut inverse) = (0.0, 0.0);
-    for (point, x) in points {
-        let (sum, det) = (point.sum(&x), point.det(&x));
-        direct += point.area * sum;
-        inverse += point.area * sum / (det * det);
+/// Finds the factor by which a map is to be scaled for the least symmetric Dirichlet energy.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct BestScale {
+    direct: f64,
+    inverse: f64,
+}
+
+impl BestScale {
+    /// Counts a point, where the map with the nodes at `x` is to turn left.
+    pub fn add<const N: usize>(&mut self, point: &Point<N>, x: &[[f64; 2]; N]) {
+        let (sum, det) = (point.sum(x), point.det(x));
+        self.direct += point.area * sum;
+        self.inverse += point.area * sum / (det * det);
     }
-    (inverse / direct).sqrt().sqrt()
+
+    /// The factor; it may be no number where the map did not turn left.
+    pub fn factor(self) -> f64 {
+        (self.inverse / self.direct).sqrt().sqrt()
+    }
 }
 
 /// A complex number over its absolute value; any direction where that is zero.
@@ -353,7 +362,9 @@ mod tests {
         assert!(slope.iter().all(|g| g.abs() < 1e-12), "{slope:?}");
         // Twice as large is found to be.
         let twice = x.map(|p| p.map(|c| 2.0 * c));
-        assert!((best_scale([(point, twice)].into_iter()) - 0.5).abs() < 1e-14);
+        let mut scale = BestScale::default();
+        scale.add(&point, &twice);
+        assert!((scale.factor() - 0.5).abs() < 1e-14);
     }
 
     #[test]

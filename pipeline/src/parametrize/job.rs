@@ -84,7 +84,7 @@ pub(super) struct Maps {
 }
 
 /// Conformal distortions that 99 % of the area do not exceed, once they were asked for.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Quantiles {
     of_start: OnceLock<f64>,
     of_harmonic: OnceLock<f64>,
@@ -697,7 +697,7 @@ fn untangle_and_certify(
             steps += found.iterations;
             let is_even = |map: &CertifiedMap| distortion::area_ratio(chart, map) <= EVEN.min(max_area_ratio);
             if let Some(nearer) = proven(&found.nodes, found.hole_centres.clone()).filter(is_even) {
-                least = measure.of(&nearer);
+                least = found.energy / measure.least;
                 certified = nearer;
                 descended = Some(found);
             }

@@ -109,7 +109,7 @@ impl Objective for Distance<'_> {
 #[test]
 fn the_distance_to_a_map_is_a_model_of_itself() {
     let (chart, start, _) = prepared(&shapes::disk(3));
-    objective::tests::check_derivatives(&Distance { chart: &chart, target: uv_of(&start, &[]) });
+    assert!(objective::tests::check_derivatives(&Distance { chart: &chart, target: uv_of(&start, &[]) }) >= 0.0);
 }
 
 #[test]

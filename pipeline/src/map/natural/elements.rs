@@ -3,7 +3,7 @@
 use crate::atlas::Chart;
 use crate::fem::element::P1;
 use crate::fem::geometry::FirstForm;
-use crate::fem::isotropic::{self, Density, Local, Part, Point};
+use crate::fem::isotropic::{BestScale, Density, Local, Part, Point};
 use crate::fem::jacobian::cross;
 use crate::mesh::TriangleShape;
 
@@ -71,7 +71,9 @@ impl Elements {
     /// The factor by which a map whose triangles all turn left is to be scaled for the least symmetric Dirichlet
     /// energy.
     pub fn best_scale(&self, uv: &[[f64; 2]]) -> f64 {
-        isotropic::best_scale(self.with_corners(uv).map(|(point, x)| (*point, x)))
+        let mut scale = BestScale::default();
+        self.with_corners(uv).for_each(|(point, x)| scale.add(point, &x));
+        scale.factor()
     }
 
     /// The gradient and the positive part of the Hessian of every triangle at `uv`.

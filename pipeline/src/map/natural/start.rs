@@ -319,8 +319,7 @@ impl Search<'_> {
         let method = places.method();
         let vertices: Vec<GridPoint> = places.into_uv().into_iter().map(GridPoint::vertex).collect();
         let boundary = Boundary::chords(filled, |v| vertices[v.index()]);
-        let polygons: Vec<Vec<GridPoint>> =
-            chart.loops().map(|l| l.iter().map(|h| vertices[chart.from(*h).index()]).collect()).collect();
+        let polygons = along_loops(chart, &vertices);
         // Inside such loops no map is one-to-one, and it takes long to try all weights.
         if polygons::check(&polygons).is_some() {
             return Ok(Err(Some(NoNatural::Crossing)));
@@ -413,6 +412,11 @@ impl Search<'_> {
     }
 }
 
+/// What is given for each vertex, along each loop of a chart.
+fn along_loops<T: Copy>(chart: &Chart, of_vertices: &[T]) -> Vec<Vec<T>> {
+    chart.loops().map(|l| l.iter().map(|h| of_vertices[chart.from(*h).index()]).collect()).collect()
+}
+
 /// Places of the vertices in the plane.
 enum Places {
     /// Flattened boundary first, harmonic inside.
@@ -441,8 +445,7 @@ impl Places {
             // The area inside the outer polygon and outside the others is that of all triangles. What is harmonic inside may fold,
             // and go beyond.
             Self::Flattened(uv) => {
-                let loops = chart.loops().map(|boundary_loop| boundary_loop.iter().map(|h| uv[chart.from(*h).index()]));
-                let polygons: Vec<Polygon> = loops.map(Iterator::collect).collect();
+                let polygons: Vec<Polygon> = along_loops(chart, &uv);
                 let area = 0.5 * polygons.iter().map(|polygon| doubled_area(polygon)).sum::<f64>();
                 Self::Flattened(fitted_to_size(chart, area, polygons.concat(), uv)?)
             }

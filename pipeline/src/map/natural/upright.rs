@@ -4,8 +4,8 @@
 /// looked at as a whole.
 const PAIRS: usize = 4_000_000;
 
-/// The direction of the longer side of the smallest rectangle around points; none where they have none. (One side of such a rectangle lies
-/// on a side of the convex hull: Freeman and Shapira 1975, *Determining the minimum-area encasing rectangle for an
+/// The direction of the longer side of the smallest rectangle around points; none where they have none. (One side of such a
+/// rectangle lies on a side of the convex hull: Freeman and Shapira 1975, *Determining the minimum-area encasing rectangle for an
 /// arbitrary closed curve*, doi 10.1145/360881.360919.)
 pub(super) fn longer_side(points: &[[f64; 2]]) -> Option<[f64; 2]> {
     let hull = convex_hull(points);
