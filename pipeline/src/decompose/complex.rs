@@ -48,6 +48,8 @@ pub(super) struct HalfArc {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cell {
     pub faces: usize,
+    /// Whether features keep it apart from what is beyond them: see [`Dual::is_kept`].
+    pub is_kept: bool,
     /// The Euler number of the cell, opened where it only touches itself.
     pub euler: i64,
     pub area: f64,
@@ -103,6 +105,7 @@ impl Complex {
             cell.curvature += TAU * fresh as f64;
             inside.for_each(|k| cell.curvature -= dual.angle(HalfEdgeId::side_of(FaceId::at(f), k)));
             cell.faces += 1;
+            cell.is_kept |= dual.is_kept[f];
             cell.area += area;
             (0..3).for_each(|k| cell.normal[k] += normal[k]);
             (0..3).for_each(|k| cell.centroid[k] += area * centroid[k]);

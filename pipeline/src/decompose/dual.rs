@@ -29,6 +29,8 @@ pub(super) struct Dual<'a> {
     sides: Vec<Side>,
     /// Per edge 1 minus the cosine of its dihedral angle, at most 1, if it is a feature: no cell crosses it; else 0.
     pub sharpness: Vec<f64>,
+    /// Per triangle, whether features keep apart what it lies in however small that is.
+    pub is_kept: Vec<bool>,
     points: Vec<Vec3>,
     centroids: Vec<Vec3>,
     areas: Vec<f64>,
@@ -58,6 +60,7 @@ impl<'a> Dual<'a> {
         let mut made = Self {
             sides: (0..3 * triangles.len()).map(|h| side(HalfEdgeId::at(h))).collect(),
             sharpness: vec![0.0; mesh.edges().len()],
+            is_kept: vec![false; triangles.len()],
             centroids: triangles.iter().map(centroid).collect(),
             areas: mesh.metric().shapes.iter().map(|s| s.area()).collect(),
             steps: Vec::new(),

@@ -147,9 +147,13 @@ impl Merge<'_, '_> {
             return false;
         }
         let is_across_feature = 2.0 * union.shared_feature > union.shared;
-        // What has little of a feature around it is no face of its own: the feature does not keep it apart.
-        let least_sharp = || self.sharp_outline(a).min(self.sharp_outline(b));
-        !is_across_feature || least_sharp() < self.min_outline
+        !is_across_feature || !self.is_face(a) || !self.is_face(b)
+    }
+
+    /// Whether features keep a region apart: what has little of them around it is no face of its own.
+    fn is_face(&self, region: u32) -> bool {
+        let is_kept = |c: &u32| self.regions.complex.cells[*c as usize].is_kept;
+        self.sharp_outline(region) >= self.min_outline || self.regions.all[region as usize].cells.iter().any(is_kept)
     }
 
     /// The length of the features around a region, weighed by their sharpness.

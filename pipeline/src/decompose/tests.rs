@@ -301,3 +301,39 @@ fn a_bevel_is_a_face_unless_it_is_narrow() {
     let charts = |width: f64| atlas(&bevelled(width), &Settings::default()).charts().len();
     assert_eq!((charts(0.2), charts(0.004)), (3, 2));
 }
+
+/// A square plate with a cube of a 60th of its width on it; the corners of its top are moved by `uneven` of that, so that
+/// none of its sides is flat.
+fn with_small_cube(uneven: f64) -> TriangleSoup {
+    let n = 60_u32;
+    let at = |i: u32, j: u32| [f64::from(i) / f64::from(n), f64::from(j) / f64::from(n), 0.0];
+    let mut points: Vec<[f64; 3]> = (0..=n).flat_map(|j| (0..=n).map(move |i| at(i, j))).collect();
+    let quad = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    let cell = |(i, j): (u32, u32)| {
+        let a = j * (n + 1) + i;
+        [a, a + 1, a + n + 2, a + n + 1]
+    };
+    let (middle, side) = ((n / 2, n / 2), 1.0 / f64::from(n));
+    let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j))).filter(|cell| *cell != middle);
+    let mut triangles: Vec<[u32; 3]> = cells.flat_map(|c| quad(cell(c))).collect();
+    let foot = cell(middle);
+    let top = [0, 1, 2, 3].map(|k| points.len() as u32 + k);
+    for (k, f) in foot.into_iter().enumerate() {
+        let [x, y, _] = points[f as usize];
+        let moved = [[1.0, 0.5, 0.2], [-0.3, 1.0, 0.8], [0.6, -1.0, 0.1], [-1.0, -0.4, 0.9]][k];
+        let [dx, dy, dz] = moved.map(|c: f64| c * uneven * side);
+        points.push([x + dx, y + dy, side + dz]);
+    }
+    triangles.extend(quad(top));
+    for k in 0..4 {
+        let next = (k + 1) % 4;
+        triangles.extend(quad([foot[k], foot[next], top[next], top[k]]));
+    }
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn small_faces_are_kept_where_they_are_flat() {
+    let charts = |uneven: f64| atlas(&with_small_cube(uneven), &Settings::default()).charts().len();
+    assert_eq!((charts(0.0), charts(0.1)), (6, 1));
+}

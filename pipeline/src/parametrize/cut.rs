@@ -12,7 +12,7 @@ use super::job::{ChartError, MapError, Maps, map_whole, natural_maps};
 use crate::atlas::Chart;
 use crate::certified::BoundaryFound;
 use crate::decompose;
-use crate::map::natural;
+use crate::map::natural::{self, NoNatural};
 use crate::measure::distortion;
 use crate::monitor::{Interrupted, Monitor};
 use crate::settings::{BoundaryShape, ChartSettings};
@@ -22,6 +22,10 @@ use std::collections::BTreeMap;
 /// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
 /// of a terrain, at 10 to 50, and soccerball_g31, at 80, are well left whole.
 const STRETCHED: f64 = 100.0;
+
+/// The same for those that no natural boundary follows evenly: boxes with an open side, as the mirrors of milk_truck, at 34, with
+/// elements of gamma 0.07.
+const UNEVEN: f64 = 30.0;
 
 /// Charts with holes on the disk are cut, too, if so much of their harmonic map is invalid: untangling takes long, and stretches
 /// them (the inside of imu_adis16480, with 16 holes: 6 % invalid, an energy of nearly four times the least one, and Gmsh did not
@@ -114,13 +118,14 @@ impl Cutter<'_> {
         // Only a chart that its map does not suit is asked for another one.
         let is_pierced = map.boundary != BoundaryFound::Natural && !chart.holes().is_empty();
         let is_tangled = is_pierced && map.invalid_share(chart) > TANGLED;
-        if (stretch <= STRETCHED && !is_tangled)
-            || self.suits(chart, map.boundary, stretch, STRETCHED)? == Suits::Natural
+        let is_uneven = matches!(map.boundary, BoundaryFound::Circle { why_none: Some(NoNatural::Uneven { .. }) });
+        let bearable = if is_uneven { UNEVEN } else { STRETCHED };
+        if (stretch <= bearable && !is_tangled) || self.suits(chart, map.boundary, stretch, bearable)? == Suits::Natural
         {
             return Ok(None);
         }
         let most = chart.holes().len().max(1) * if stretch > TORN || is_tangled { MANY } else { FEW };
-        for bound in [GOOD, STRETCHED] {
+        for bound in [GOOD, bearable] {
             if let Some((parts, naturals)) = self.parts_within(chart, map, bound, most)?
                 && (bound == GOOD || naturals > 0)
             {
@@ -346,7 +351,11 @@ impl Cutter<'_> {
 /// The parts of `chart`, each with whether little more than a peel was taken off it.
 fn marked(chart: &Chart, parts: Vec<Chart>) -> Vec<(Chart, bool)> {
     let large = PEELED * chart.triangles().len() as f64;
-    parts.into_iter().map(|part| (part.triangles().len() as f64 > large, part)).map(|(is, part)| (part, is)).collect()
+    let mark = |part: Chart| {
+        let is_peeled = part.triangles().len() as f64 > large;
+        (part, is_peeled)
+    };
+    parts.into_iter().map(mark).collect()
 }
 
 /// A corner of a part that is sharper than [`SHARP`].
