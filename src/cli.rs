@@ -157,8 +157,8 @@ pub struct Making {
     /// Edges with a dihedral angle above DEG degrees, and those above 5/8 of it that continue them, are features, along
     /// which charts end; off: none are [default: 40]. Passed over are creases that part nothing (they run out) or are
     /// short; those around patches too small for a face (unless they are flat), the sooner the blunter they are, and blunt
-    /// ones around narrow bevels; and angles that only single triangles have (raw noise: angles are measured over some triangles on either
-    /// side), or that rounding of the coordinates may have made
+    /// ones around narrow bevels; and angles that only single triangles have (raw noise: angles are measured over some
+    /// triangles on either side), or that rounding of the coordinates may have made
     #[arg(long, value_name = "DEG|off")]
     pub feature_angle: Option<FeatureAngle>,
     /// Let holes of charts be holes of the surface only

@@ -18,7 +18,7 @@ fn pairs(outer: Range<u32>, inner: Range<u32>) -> impl Iterator<Item = (u32, u32
 }
 
 /// The two triangles into which the diagonal from the first corner to the third one cuts a square.
-fn halves([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
+pub(crate) fn halves([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
     [[a, b, c], [a, c, d]]
 }
 

@@ -98,8 +98,8 @@ fn mark_features(dual: &mut Dual, angle: f64) -> Result<usize, Interrupted> {
     while drop_small_patches(dual, &features) {
         dual.checkpoint()?;
     }
-    drop_dangling(dual, &features);
     let (patch_of, count) = patches(dual);
+    drop_dangling(dual, &features, &patch_of);
     let of_patches = measured(dual, &patch_of, count);
     dual.is_kept = patch_of.iter().map(|patch| of_patches[*patch as usize].is_flat_face()).collect();
     Ok(dual.sharpness.iter().filter(|s| **s > 0.0).count())
@@ -257,9 +257,8 @@ impl Patch {
     }
 }
 
-/// Features that separate nothing are none: a crease that runs out, or noise.
-fn drop_dangling(dual: &mut Dual, features: &[HalfEdgeId]) {
-    let (patch_of, _) = patches(dual);
+/// Features that separate nothing are none: a crease that runs out, or noise. The patches stay the same.
+fn drop_dangling(dual: &mut Dual, features: &[HalfEdgeId], patch_of: &[u32]) {
     for h in features {
         if dual.twin(*h).is_some_and(|t| patch_of[t.face().index()] == patch_of[h.face().index()]) {
             dual.sharpness[dual.mesh.edges().edge(*h).index()] = 0.0;

@@ -150,7 +150,7 @@ impl Merge<'_, '_> {
         !is_across_feature || !self.is_face(a) || !self.is_face(b)
     }
 
-    /// Whether features keep a region apart: what has little of them around it is no face of its own.
+    /// Whether features keep a region apart: what has little of them around it is no face of its own, unless it is flat.
     fn is_face(&self, region: u32) -> bool {
         let is_kept = |c: &u32| self.regions.complex.cells[*c as usize].is_kept;
         self.sharp_outline(region) >= self.min_outline || self.regions.all[region as usize].cells.iter().any(is_kept)

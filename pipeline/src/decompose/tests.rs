@@ -289,8 +289,7 @@ fn bevelled(width: f64) -> TriangleSoup {
     let points = (0..=2 * n + 1).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| point(i, j)).collect();
     let quad = |(i, j): (u32, u32)| {
         let a = j * (n + 1) + i;
-        let [b, c, d] = [a + 1, a + n + 2, a + n + 1];
-        [[a, b, c], [a, c, d]]
+        shapes::halves([a, a + 1, a + n + 2, a + n + 1])
     };
     let triangles = (0..2 * n + 1).flat_map(|j| (0..n).map(move |i| (i, j))).flat_map(quad).collect();
     TriangleSoup::new(points, triangles).expect("sound")
@@ -308,14 +307,13 @@ fn with_small_cube(uneven: f64) -> TriangleSoup {
     let n = 60_u32;
     let at = |i: u32, j: u32| [f64::from(i) / f64::from(n), f64::from(j) / f64::from(n), 0.0];
     let mut points: Vec<[f64; 3]> = (0..=n).flat_map(|j| (0..=n).map(move |i| at(i, j))).collect();
-    let quad = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
     let cell = |(i, j): (u32, u32)| {
         let a = j * (n + 1) + i;
         [a, a + 1, a + n + 2, a + n + 1]
     };
     let (middle, side) = ((n / 2, n / 2), 1.0 / f64::from(n));
     let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j))).filter(|cell| *cell != middle);
-    let mut triangles: Vec<[u32; 3]> = cells.flat_map(|c| quad(cell(c))).collect();
+    let mut triangles: Vec<[u32; 3]> = cells.flat_map(|c| shapes::halves(cell(c))).collect();
     let foot = cell(middle);
     let top = [0, 1, 2, 3].map(|k| points.len() as u32 + k);
     for (k, f) in foot.into_iter().enumerate() {
@@ -324,10 +322,10 @@ fn with_small_cube(uneven: f64) -> TriangleSoup {
         let [dx, dy, dz] = moved.map(|c: f64| c * uneven * side);
         points.push([x + dx, y + dy, side + dz]);
     }
-    triangles.extend(quad(top));
+    triangles.extend(shapes::halves(top));
     for k in 0..4 {
         let next = (k + 1) % 4;
-        triangles.extend(quad([foot[k], foot[next], top[next], top[k]]));
+        triangles.extend(shapes::halves([foot[k], foot[next], top[next], top[k]]));
     }
     TriangleSoup::new(points, triangles).expect("sound")
 }
