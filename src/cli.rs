@@ -1,7 +1,7 @@
 //! The command line.
 
 use crate::settings::{
-    Boundary, ExportTarget, FeatureAngle, Inputs, Log, RawSettings, Refine, Refused, Settings, SettingsError,
+    AlsoFiles, Boundary, ExportTarget, FeatureAngle, Inputs, Log, RawSettings, Refine, Refused, Settings, SettingsError,
 };
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
@@ -150,10 +150,36 @@ pub struct Making {
     /// Meshers to which results are handed: gmsh writes atlas.msh and remesh.geo [default: gmsh]
     #[arg(long, value_enum, value_name = "MESHER")]
     pub hand_off: Option<ExportTarget>,
+    /// Write these files for other programs, too: obj (surface.obj) and glb (surface.glb), with texture coordinates; welded
+    /// (welded.vtu), with one node where charts meet; with commas between them, or none [default: none]
+    #[arg(long, value_name = "obj,glb,welded")]
+    pub also: Option<AlsoFiles>,
     /// Edge length of the mesh to be made, in the unit of the input [default: that of as many equilateral triangles
     /// of the same area, but at most 1/50 of the bounding box's diagonal]
     #[arg(long, value_name = "H")]
     pub size: Option<f64>,
+    /// Shorter edges where the surface bends, so that N make a full turn [default: edges of one length]
+    #[arg(long, value_name = "N")]
+    pub size_curvature: Option<f64>,
+    /// No edges shorter than this, in the unit of the input, whatever bends and narrow places need; the report tells where
+    /// they would need shorter ones
+    #[arg(long, value_name = "H")]
+    pub size_min: Option<f64>,
+    /// Edges as long as this array of points says, in the unit of the input: of a VTK file, or the view of that name in an MSH
+    /// file; of one component. Shorter ones where narrow places, --size-curvature or --deviation need them; none longer than
+    /// --size, which is the largest of these lengths where it is not given
+    #[arg(long, value_name = "ARRAY")]
+    pub size_from: Option<String>,
+    /// Edges become longer by at most G times the distance from shorter ones [default: 0.4]
+    #[arg(long, value_name = "G")]
+    pub gradation: Option<f64>,
+    /// Edges so short that mesh and surface are about D from each other at most, in the unit of the input; `planish check --mesh`
+    /// with --deviation D tells whether they are
+    #[arg(long, value_name = "D")]
+    pub deviation: Option<f64>,
+    /// Order of the elements of the mesh: 2 has Gmsh make curved triangles, whose nodes all lie on the surface [default: 1]
+    #[arg(long, value_name = "1|2")]
+    pub mesh_order: Option<u8>,
     /// Edges with a dihedral angle above DEG degrees, and those above 5/8 of it that continue them, are features, along
     /// which charts end; off: none are [default: 40]. Passed over are creases that part nothing (they run out) or are
     /// short; those around patches too small for a face (unless they are flat), the sooner the blunter they are, and blunt
@@ -237,6 +263,14 @@ pub struct Check {
     /// The least gamma of a fine element
     #[arg(long, value_name = "G", requires = "mesh", default_value_t = 0.1)]
     pub min_gamma: f64,
+    /// Find how far mesh and surface are from each other, inside elements, too, and let nowhere be more than D, in the unit of
+    /// the input
+    #[arg(long, value_name = "D", requires = "mesh")]
+    pub deviation: Option<f64>,
+    /// Where it is more, ask for edges half as long: remesh.geo heeds that when Gmsh runs again. Three times at most, and no
+    /// edges shorter than --size-min was
+    #[arg(long, requires = "deviation")]
+    pub finer: bool,
     /// Print what is found of the mesh as JSON
     #[arg(long, requires = "mesh")]
     pub json: bool,
@@ -269,6 +303,26 @@ pub struct Reading {
     /// an open edge of another side [default: 1e-6]
     #[arg(long, value_name = "REL")]
     pub weld: Option<f64>,
+    /// Let this tell the named parts of a surface, the borders of which become seams: a cell array of a VTK file, a face
+    /// property of PLY, `group`, `object` or `material` of OBJ, `mesh` or `material` of glTF, `physical` or `elementary` of MSH
+    /// [default: solids of STL, groups of OBJ, meshes of glTF, physical groups of MSH, references of MEDIT, and arrays with
+    /// usual names such as label, region, group, material]
+    #[arg(long, value_name = "ARRAY")]
+    pub label: Option<String>,
+    /// Let names of parts count for nothing: their borders are no seams
+    #[arg(long, conflicts_with = "label")]
+    pub ignore_labels: bool,
+}
+
+impl Reading {
+    fn said(&self) -> RawSettings {
+        RawSettings {
+            weld: self.weld,
+            label: self.label.clone(),
+            ignore_labels: self.ignore_labels.then_some(true),
+            ..RawSettings::default()
+        }
+    }
 }
 
 /// Options of all verbs.
@@ -298,7 +352,7 @@ impl Verb {
             Self::Run(run) => (&run.common, run.making.said()),
             Self::Watch(watch) => (&watch.common, watch.said()),
             Self::Check(check) => (&check.common, RawSettings::default()),
-            Self::Info(info) => (&info.common, RawSettings { weld: info.reading.weld, ..RawSettings::default() }),
+            Self::Info(info) => (&info.common, info.reading.said()),
             Self::Apart(apart) => (&apart.common, RawSettings { log: Some(Log::Json), ..RawSettings::default() }),
             Self::Retry(retry) => (&retry.common, RawSettings { out: retry.out.clone(), ..RawSettings::default() }),
             Self::Status(status) => (&status.common, RawSettings { out: status.out.clone(), ..RawSettings::default() }),
@@ -334,20 +388,26 @@ impl Making {
             order: self.order,
             boundary: self.boundary,
             refine: self.refine,
-            weld: self.reading.weld,
             feature_angle: self.feature_angle,
             strict_disks: self.strict_disks.then_some(true),
             max_area_ratio: self.max_area_ratio,
             max_triangles: self.max_triangles,
             hand_off: self.hand_off,
+            also: self.also.clone(),
             size: self.size,
+            size_curvature: self.size_curvature,
+            size_min: self.size_min,
+            size_from: self.size_from.clone(),
+            gradation: self.gradation,
+            deviation: self.deviation,
+            mesh_order: self.mesh_order,
             force: self.force.then_some(true),
             jobs: self.jobs,
             commands: self.commands,
             memory: self.memory,
             job_memory: self.job_memory,
             job_time: self.job_time,
-            ..RawSettings::default()
+            ..self.reading.said()
         }
     }
 }

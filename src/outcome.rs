@@ -55,6 +55,10 @@ pub enum Code {
     OnlyDegenerate,
     /// Non-manifold edges cut the surface into thousands of sheets: faces of volume elements.
     VolumeElements,
+    /// Nothing in the file has the name that `--label` asks for, or what has it labels no triangles.
+    NoLabels,
+    /// The file has no array of points that tells sizes as `--size-from` asks for.
+    NoSizes,
     /// More elements than planish can number.
     TooLarge,
     /// The surface is not one disk: given by earlier versions only, and read in their reports.

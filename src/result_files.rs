@@ -21,17 +21,35 @@ pub const ATLAS_MSH: &str = "atlas.msh";
 /// The same in a larger unit, where Gmsh needs that.
 pub const ENLARGED_MSH: &str = "atlas-enlarged.msh";
 
+/// Sizes on the surface, where they vary, which [`REMESH`] reads; in the unit of the file that it merges.
+pub const SIZES: &str = "sizes.pos";
+
 /// The script that has Gmsh remesh through the maps.
 pub const REMESH: &str = "remesh.geo";
 
+/// The surface with texture coordinates, as OBJ: where `--also obj` asks for it.
+pub const SURFACE_OBJ: &str = "surface.obj";
+
+/// The same as binary glTF: where `--also glb` asks for it.
+pub const SURFACE_GLB: &str = "surface.glb";
+
+/// The surface with one node where charts meet: where `--also welded` asks for it.
+pub const WELDED: &str = "welded.vtu";
+
 /// What `planish check --mesh` found; written later than the result.
 pub const MESH: &str = "mesh.json";
+
+/// Smaller sizes where `planish check --finer` found a mesh too far from the surface, time after time; written later than the
+/// result, and read by [`REMESH`].
+pub const FINER: [&str; 3] = ["finer-1.pos", "finer-2.pos", "finer-3.pos"];
 
 /// What the commands on a result did; written later than the result.
 pub const HOOKS: &str = "hooks.json";
 
 /// What planish writes beside the files that a report names as its outputs.
-pub const BESIDE_OUTPUTS: [&str; 3] = [REPORT, MESH, HOOKS];
+pub const BESIDE_OUTPUTS: [&str; 6] = [REPORT, MESH, HOOKS, FINER[0], FINER[1], FINER[2]];
 
-/// The blocks of [`ATLAS_VTM`], by their names in ParaView.
-pub const ATLAS_BLOCKS: [(&str, &str); 3] = [("surface", SURFACE), ("param", PARAM), ("seams", SEAMS)];
+/// The cells of [`SURFACE`] with one label, by the name of its group: what [`ATLAS_VTM`] shows where there are labels.
+pub fn surface_of(group: &str) -> String {
+    format!("surface-{group}.vtu")
+}

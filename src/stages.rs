@@ -1,13 +1,13 @@
 //! What each stage does with an input: values in, values out. The threads are in [`crate::conveyor`].
 
 use crate::export;
-use crate::formats::{vtm, vtp, vtu};
+use crate::formats::{Label, glb, surface_obj, vtm, vtp, vtu, welded};
 use crate::outcome::{Abort, Code, Reason};
 use crate::report::{
     self, CertifiedFacts, Decomposition, Facts, Input, Output, RefusedComponent, Report, SurfaceFacts,
 };
 use crate::result_files;
-use crate::settings::{self, Settings};
+use crate::settings::{self, Also, Settings};
 use planish_core::atlas::Atlas;
 use planish_core::fem::sparse;
 use planish_core::map::linear;
@@ -147,29 +147,44 @@ fn not_mapped(error: ChartError) -> Abort {
 }
 
 /// Puts the charts of a surface together, `whole` of which decomposition made; returns what is known of the atlas then, and
-/// the files of the result.
+/// the files of the result. `labels` are those of the input.
 ///
 /// # Errors
-/// Where the result cannot be encoded, a fault of planish; or that it is no longer wanted.
+/// Where the result cannot be encoded, a fault of planish; the refusal of a surface that a file asked for cannot hold; or that
+/// it is no longer wanted.
 pub fn assemble(
     mesh: SurfaceMesh,
     charts: Vec<CertifiedChart>,
     whole: usize,
+    labels: &[Label],
     settings: &Settings,
     monitor: &dyn Monitor,
 ) -> Result<(CertifiedFacts, Files), Abort> {
     let charts_by_splitting = charts.len() - whole;
     let atlas = CertifiedAtlas::gather(mesh, charts, settings.size).map_err(internal)?;
     atlas.charts().iter().for_each(warn_if_unsolved);
-    let mut files = encode(&atlas)?;
+    let mut files = encode(&atlas, labels)?;
+    for also in &settings.also {
+        files.push(encode_also(*also, &atlas, labels)?);
+    }
     let mut hand_off = None;
     if settings.hand_off == settings::ExportTarget::Gmsh {
         let size = settings.size.unwrap_or_else(|| atlas.mesh().default_size());
-        let export = export::gmsh(&atlas, size, monitor).map_err(|Interrupted| Abort::Unwanted)?;
+        let features = settings.feature_angle.filter(|_| settings.names_features);
+        let sizes = export::Sizes {
+            size,
+            min: settings.size_min.unwrap_or(0.0).min(size),
+            per_turn: settings.size_curvature,
+            deviation: settings.deviation,
+            gradation: settings.gradation,
+        };
+        let wanted = export::Wanted { sizes, labels, features, order: settings.mesh_order };
+        let export = export::gmsh(&atlas, &wanted, monitor).map_err(|Interrupted| Abort::Unwanted)?;
         files.extend(export.files);
         hand_off = Some(export.report);
     }
     let facts = CertifiedFacts {
+        labels: report::labels(&atlas, labels),
         charts: report::charts(&atlas),
         charts_by_splitting,
         seams: report::seams(atlas.seams()),
@@ -193,7 +208,7 @@ pub fn finish(input: Input, found: Repaired, atlas: Atlas, settings: &Settings) 
     for chart in atlas.into_charts() {
         done.extend(ChartJob::new(chart, of_charts).run(&NoMonitor).map_err(not_mapped)?);
     }
-    let (certified, files) = assemble(found.mesh, done, whole, settings, &NoMonitor)?;
+    let (certified, files) = assemble(found.mesh, done, whole, &[], settings, &NoMonitor)?;
     Ok((facts.certified(settings, certified), files))
 }
 
@@ -204,14 +219,48 @@ fn warn_if_unsolved(certified: &CertifiedChart) {
 }
 
 /// Encodes what ParaView shows.
-fn encode(atlas: &CertifiedAtlas) -> Result<Files, Reason> {
-    let files = [
-        (result_files::SURFACE, vtu::surface(atlas).map_err(not_encoded)?),
-        (result_files::PARAM, vtu::param(atlas).map_err(not_encoded)?),
-        (result_files::SEAMS, vtp::seams(atlas.mesh(), atlas.seams()).map_err(not_encoded)?),
-        (result_files::ATLAS_VTM, vtm::blocks(&result_files::ATLAS_BLOCKS)),
+fn encode(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Files, Reason> {
+    let mut files = vec![
+        (result_files::SURFACE.to_owned(), vtu::surface(atlas, labels).map_err(not_encoded)?),
+        (result_files::PARAM.to_owned(), vtu::param(atlas, labels).map_err(not_encoded)?),
+        (result_files::SEAMS.to_owned(), vtp::seams(atlas, labels).map_err(not_encoded)?),
     ];
-    Ok(files.map(|(name, content)| (name.to_owned(), content)).into())
+    let mut parts = Vec::new();
+    for (label, Label { name, group, .. }) in labels.iter().enumerate() {
+        let file = result_files::surface_of(group);
+        parts.push(vtm::Block::file(name, &file));
+        files.push((file, vtu::part(atlas, labels, label).map_err(not_encoded)?));
+    }
+    let surface = match parts.len() {
+        0 => vtm::Content::File(result_files::SURFACE.to_owned()),
+        _ => vtm::Content::Blocks(parts),
+    };
+    let blocks = [
+        vtm::Block { name: "surface".to_owned(), content: surface },
+        vtm::Block::file("param", result_files::PARAM),
+        vtm::Block::file("seams", result_files::SEAMS),
+    ];
+    files.push((result_files::ATLAS_VTM.to_owned(), vtm::blocks(&blocks)));
+    Ok(files)
+}
+
+/// Encodes a file for other programs.
+fn encode_also(also: Also, atlas: &CertifiedAtlas, labels: &[Label]) -> Result<(String, Vec<u8>), Reason> {
+    let content = match also {
+        Also::Obj => surface_obj::surface(atlas, labels),
+        Also::Glb => glb::surface(atlas, labels).map_err(|e| e.reason())?,
+        Also::Welded => welded::surface(atlas, labels).map_err(not_encoded)?,
+    };
+    Ok((also_file(also).to_owned(), content))
+}
+
+/// The name of a file for other programs.
+pub fn also_file(also: Also) -> &'static str {
+    match also {
+        Also::Obj => result_files::SURFACE_OBJ,
+        Also::Glb => result_files::SURFACE_GLB,
+        Also::Welded => result_files::WELDED,
+    }
 }
 
 fn not_encoded(error: impl std::fmt::Display) -> Reason {

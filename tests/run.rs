@@ -138,6 +138,7 @@ fn wrong_usage_is_exit_code_2_and_does_nothing() {
         ["--weld", "nan"],
         ["--size", "0"],
         ["--hand-off", "mmg"],
+        ["--also", "stl"],
         ["--config", "no/such.toml"],
         ["--jobs", "0"],
         ["--memory", "1MiB"],
@@ -279,6 +280,29 @@ fn the_hand_off_can_be_left_out_and_its_size_chosen() {
     std::fs::write(out.of("disk.stl").join("report.json"), report.to_json().expect("JSON")).expect("written");
     let ended = planish(["check".as_ref(), out.of("disk.stl").as_os_str()]);
     assert!(ended.code == Some(1) && ended.err.contains("atlas-enlarged.msh: is not listed"), "{}", ended.err);
+}
+
+/// What is asked for in addition is part of what decides a result.
+#[test]
+fn files_for_other_programs_are_written_when_they_are_asked_for() {
+    let (out, disk) = (Out::new(), fixture("disk.stl"));
+    let files = || out.report("disk.stl").outputs.into_iter().map(|o| o.file).collect::<Vec<_>>();
+    out.run(&[&disk], &["--hand-off", "none"]);
+    assert_eq!(files(), ALL_FILES[..4]);
+    assert_eq!(out.run(&[&disk], &["--hand-off", "none", "--also", "glb,obj,welded"]).code, Some(0));
+    assert_eq!(files(), [&ALL_FILES[..4], &["surface.obj", "surface.glb", "welded.vtu"]].concat());
+    let again = out.run(&[&disk], &["--hand-off", "none", "--also", "welded,obj,glb"]);
+    assert!(again.out.contains("up to date"), "their order means nothing: {}", again.out);
+    let before = out.read("disk.stl", "surface.glb");
+    out.run(&[&disk], &["--hand-off", "none", "--also", "obj,glb,welded", "--force"]);
+    assert!(before == out.read("disk.stl", "surface.glb"), "the same bytes every time");
+    // Each of them belongs to the result.
+    std::fs::write(out.of("disk.stl").join("surface.obj"), "v 0 0 0\n").expect("written");
+    let ended = planish(["check".as_ref(), out.of("disk.stl").as_os_str()]);
+    assert!(ended.code == Some(1) && ended.err.contains("surface.obj"), "{}", ended.err);
+    // One that is not asked for any more goes.
+    out.run(&[&disk], &["--hand-off", "none", "--also", "obj"]);
+    assert!(!out.of("disk.stl").join("welded.vtu").exists() && out.of("disk.stl").join("surface.obj").exists());
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 use crate::mesh::{Metric, Patch, SurfaceMesh, TriangleShape};
 use crate::topology::{ChartId, EdgeTable, FaceId, HalfEdgeId, VertexId};
-use crate::vec3::Vec3;
+use crate::vec3::{Vec3, triangle_area};
 
 /// A connected, oriented part of a surface of genus 0 whose boundary loops are simple and share no vertex.
 /// Made by [`crate::decompose()`].
@@ -86,6 +86,13 @@ impl Chart {
     /// The mollified area of a triangle in the unit of the input, squared.
     pub fn area(&self, face: usize) -> f64 {
         self.shapes[face].area() / self.scale / self.scale
+    }
+
+    /// The area of all triangles in space, before mollification, in the unit of the input, squared.
+    pub fn true_area(&self) -> f64 {
+        // Products of coordinates may overflow or underflow where the area itself does not.
+        let scaled = |face: usize| triangle_area(self.corners(face).map(|p| p.map(|c| c * self.scale)));
+        (0..self.triangles.len()).map(scaled).sum::<f64>() / self.scale / self.scale
     }
 
     /// The power of two by which lengths in the unit of the input become those of the shapes.

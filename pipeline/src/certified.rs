@@ -276,6 +276,11 @@ impl CertifiedAtlas {
         &self.charts
     }
 
+    /// The label of all triangles of a chart ([`crate::mesh::TriangleSoup::with_labels`]); none where the input has no labels.
+    pub fn label(&self, chart: ChartId) -> Option<u32> {
+        self.mesh.label(self.charts[chart.index()].chart().faces()[0].index())
+    }
+
     /// The curves between charts, and along the open boundary.
     pub fn seams(&self) -> &SeamNetwork {
         &self.seams

@@ -23,6 +23,7 @@ use crate::atlas::Chart;
 use crate::mesh::SurfaceMesh;
 use crate::topology::csr::Csr;
 use crate::topology::loops::cut_at_corners;
+use crate::topology::union_find::UnionFind;
 use crate::topology::{ChartId, CurveId, HalfEdgeId, VertexId};
 use crate::vec3::distance;
 
@@ -191,6 +192,25 @@ impl SeamNetwork {
     /// The curves that are seams: two or more charts lie beside them.
     pub fn seams(&self) -> impl Iterator<Item = &Curve> {
         self.curves.iter().filter(|c| !c.is_open())
+    }
+
+    /// The connected parts of the open boundary, each as its curves, in the order of their first ones.
+    pub fn open_parts(&self) -> Vec<Vec<CurveId>> {
+        let open: Vec<&Curve> = self.curves.iter().filter(|curve| curve.is_open()).collect();
+        let mut joined = UnionFind::new(self.points.len());
+        open.iter().for_each(|curve| {
+            joined.merge(curve.ends[0], curve.ends[1]);
+        });
+        let mut part_of_point: Vec<Option<usize>> = vec![None; self.points.len()];
+        let mut parts: Vec<Vec<CurveId>> = Vec::new();
+        for curve in open {
+            let part = *part_of_point[joined.find(curve.ends[0])].get_or_insert_with(|| {
+                parts.push(Vec::new());
+                parts.len() - 1
+            });
+            parts[part].push(curve.id);
+        }
+        parts
     }
 
     fn find_neighbours(&self, charts: usize) -> Vec<Vec<ChartId>> {

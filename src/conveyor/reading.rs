@@ -86,7 +86,8 @@ fn read_here(in_flight: Arc<InFlight>, next: &Next) {
     in_flight.job.set_beside(folder.asked());
     facts.input.beside = folder.read();
     match decoded {
-        Ok(Decoded::Fresh(Content { soup, notes })) => {
+        Ok(Decoded::Fresh(content)) => {
+            let Content { soup, notes } = *content;
             warn_of_doubts(&in_flight, &notes);
             facts.content = Some(notes);
             hand_on(&next.soups, Soup { in_flight, facts, soup });
@@ -102,7 +103,7 @@ fn read_here(in_flight: Arc<InFlight>, next: &Next) {
 /// What came of the bytes of an input.
 enum Decoded {
     /// A soup, with what else the file holds.
-    Fresh(Content),
+    Fresh(Box<Content>),
     /// The report of an older result: nothing is to be done.
     UpToDate(Box<Report>),
 }
@@ -119,7 +120,7 @@ fn decode(in_flight: &InFlight, bytes: &[u8], facts: &mut Facts, folder: &Folder
         refusal.reason
     })?;
     input::check_memory(&content.soup, &in_flight.settings)?;
-    Ok(Decoded::Fresh(content))
+    Ok(Decoded::Fresh(Box::new(content)))
 }
 
 /// The older result, where nothing is to be done.

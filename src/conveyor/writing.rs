@@ -75,7 +75,9 @@ pub(super) fn write(finished: Finished, after: &After) {
             let assembled = in_flight.compute(Stage::Write, |monitor| {
                 let (mesh, charts) = done?;
                 let charts = charts.into_iter().flatten().collect();
-                let (certified, files) = stages::assemble(mesh, charts, surface.whole, &in_flight.settings, monitor)?;
+                let labels = facts.content.as_ref().map_or(&[][..], |content| &content.labels);
+                let (certified, files) =
+                    stages::assemble(mesh, charts, surface.whole, labels, &in_flight.settings, monitor)?;
                 let report = facts.clone().certified(&in_flight.settings, certified);
                 Ok((report, not_too_large(files, &in_flight)?))
             });

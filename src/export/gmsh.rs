@@ -1,15 +1,17 @@
 //! The hand-off to Gmsh: `atlas.msh` and `remesh.geo`, with the edge length that the script asks for.
 
-use super::narrow::{Places, places};
+use super::Wanted;
+use super::groups::groups;
+use super::sizes::{Varying, varying};
 use crate::formats::gmsh;
-use crate::report::ExportReport;
+use crate::report::{ExportReport, HeldPlace};
 use crate::result_files;
 use planish_core::atlas::Chart;
 use planish_core::certified::BoundaryFound;
 use planish_core::evaluate::Plane;
 use planish_core::map::natural::{Natural, natural};
 use planish_core::measure::distortion::Summary;
-use planish_core::measure::spikes::spikes;
+use planish_core::measure::sizes::{SizedPlace, SizedTriangle};
 use planish_core::monitor::{Interrupted, Monitor};
 use planish_core::subdivide::{self, LinearAtlas, subdivide};
 use planish_core::topology::{ChartId, FaceId};
@@ -32,14 +34,16 @@ const BENT: f64 = 2.0;
 /// 6.3, 0.08 and 0.50; of gebco_seabed, at 3.2, 0.05 and 0.26; of the shell of cad_rear_case, at 2.3, 0.1 and 0.02.
 const OPENED: f64 = 2.5;
 
+/// A chart of less than so many squares of the size has a few dozen elements, nearly all with nodes on its boundary, and MeshAdapt
+/// moves what little is inside: of one of foot_bones, of four squares, at 4.7, it left an element at gamma 0.02, where
+/// Frontal-Delaunay leaves none below 0.1.
+const TINY: f64 = 8.0;
+
 /// A chart of less than so many squares of the size is quickly done: that is 10,000 elements, a few seconds.
 const QUICK: f64 = 4_500.0;
 
 /// The largest area ratio of such a chart: MeshAdapt cuts off what a map shrinks (gebco_seabed, at 5e4).
 const EVEN: f64 = 100.0;
-
-/// Gmsh asks every size field at every step: so many balls around spikes take it no longer than the mesh itself.
-const MOST_SPIKES: usize = 1_000;
 
 /// MeshAdapt of Gmsh looks for closest points among all triangles within this distance, in whatever unit.
 const SEARCHED: f64 = 0.1;
@@ -53,12 +57,13 @@ pub struct Export {
     pub report: ExportReport,
 }
 
-/// Hands an atlas to Gmsh, for triangles with edges of length `size`. Warns where Gmsh would do badly; a hand-off that fails
+/// Hands an atlas to Gmsh, for a mesh as it is wanted. Warns where Gmsh would do badly; a hand-off that fails
 /// is told and leaves the maps as they are.
 ///
 /// # Errors
 /// [`Interrupted`].
-pub fn gmsh(atlas: &CertifiedAtlas, size: f64, monitor: &dyn Monitor) -> Result<Export, Interrupted> {
+pub fn gmsh(atlas: &CertifiedAtlas, wanted: &Wanted, monitor: &dyn Monitor) -> Result<Export, Interrupted> {
+    let size = wanted.sizes.size;
     let (mesh, charts, network) = (atlas.mesh(), atlas.charts(), atlas.seams());
     let shortest_seam_distance = network.shortest_distance(mesh);
     let mut report = ExportReport { size, shortest_seam_distance, ..ExportReport::default() };
@@ -75,25 +80,27 @@ pub fn gmsh(atlas: &CertifiedAtlas, size: f64, monitor: &dyn Monitor) -> Result<
     };
     let distortions = distortions_of_written(charts, &natural, &linear);
     let algorithms = algorithms(charts, &linear, &distortions, size);
-    let Places { narrow, balls } = places(mesh, charts, network, &algorithms.adapted, size);
-    let mut spikes = spikes(mesh, charts, linear.curvatures(), size);
-    let narrow_curves = narrow.iter().map(|n| n.curves.len()).sum();
-    let mut report = ExportReport {
-        narrow_curves,
-        narrow_places: balls.len(),
-        spikes: spikes.len(),
-        ..counted(report, &linear, &algorithms)
-    };
-    if spikes.len() > MOST_SPIKES {
-        report.warning.get_or_insert_with(|| too_coarse_for_spikes(size, spikes.len()));
-        spikes.truncate(MOST_SPIKES);
+    let varying = varying(atlas, &linear, &algorithms, wanted);
+    let mut report = counted(report, &linear, &algorithms, &varying);
+    if let Some(held) = varying.held.first() {
+        report.warning.get_or_insert_with(|| held_up(wanted.sizes.min, varying.held_places, held));
     }
     if let Some(warning) = &report.warning {
         tracing::warn!("hand-off to Gmsh: {warning}");
     }
     let (surfaces, curves) = (linear.charts().len(), linear.curves().len());
-    let script = gmsh::Script { size, area: mesh.area(), surfaces, curves, algorithms, narrow, balls, spikes };
-    Ok(Export { files: files(atlas, &linear, &script), report })
+    let script = gmsh::Script {
+        size,
+        least: varying.least,
+        area: mesh.area(),
+        surfaces,
+        curves,
+        algorithms,
+        order: wanted.order,
+        heeds_finer: wanted.sizes.deviation.is_some(),
+    };
+    let files = files(atlas, &linear, &groups(atlas, wanted), &varying.triangles, &script);
+    Ok(Export { files, report })
 }
 
 /// Maps with a boundary of their own for the charts whose maps stretch, where these do less; one entry per chart.
@@ -146,7 +153,8 @@ fn stretches(certified: &CertifiedChart, linear: &LinearAtlas, distortion: &Summ
     if linear.linear_charts().binary_search(&chart.id()).is_ok() {
         return true;
     }
-    let is_quick = area_of(chart) < QUICK * size * size && distortion.area_ratio < EVEN;
+    let squares = area_of(chart) / (size * size);
+    let is_quick = (TINY..QUICK).contains(&squares) && distortion.area_ratio < EVEN;
     let is_straight = linear.straight_charts().binary_search(&chart.id()).is_ok();
     let is_harmonic = |method| !matches!(method, untangle::Method::Start | untangle::Method::Isometric);
     let is_harmonic = certified.provenance().untangle.as_ref().is_none_or(|u| is_harmonic(u.method));
@@ -166,20 +174,40 @@ fn is_flat(linear: &LinearAtlas, chart: usize) -> bool {
     Plane::of(&points, chart.triangles()).is_some()
 }
 
-fn files(atlas: &CertifiedAtlas, linear: &LinearAtlas, script: &gmsh::Script) -> Vec<(String, Vec<u8>)> {
+fn files(
+    atlas: &CertifiedAtlas,
+    linear: &LinearAtlas,
+    groups: &[gmsh::Group],
+    sizes: &[SizedTriangle],
+    script: &gmsh::Script,
+) -> Vec<(String, Vec<u8>)> {
     let mut files = vec![
-        (result_files::ATLAS_MSH.to_owned(), gmsh::atlas(atlas, linear)),
+        (result_files::ATLAS_MSH.to_owned(), gmsh::atlas(atlas, linear, groups)),
         (result_files::REMESH.to_owned(), gmsh::remesh(script)),
     ];
     let factor = script.algorithms.enlarged;
+    if script.least.is_some() {
+        files.push((result_files::SIZES.to_owned(), gmsh::sizes(sizes, factor)));
+    }
     if factor != 1.0 {
-        files.push((result_files::ENLARGED_MSH.to_owned(), gmsh::enlarged(linear, atlas.seams(), factor)));
+        files.push((result_files::ENLARGED_MSH.to_owned(), gmsh::enlarged(linear, atlas.seams(), groups, factor)));
     }
     files
 }
 
-fn counted(report: ExportReport, linear: &LinearAtlas, algorithms: &gmsh::Algorithms) -> ExportReport {
+fn counted(
+    report: ExportReport,
+    linear: &LinearAtlas,
+    algorithms: &gmsh::Algorithms,
+    varying: &Varying,
+) -> ExportReport {
     ExportReport {
+        narrow_curves: varying.narrow_curves,
+        narrow_places: varying.narrow_places,
+        spikes: varying.spikes,
+        least_size: varying.least,
+        held_places: varying.held_places,
+        held: varying.held.iter().map(|place| HeldPlace { at: place.at, size: place.size }).collect(),
         adapted_charts: algorithms.adapted.iter().map(|c| *c as u32).collect(),
         enlarged: algorithms.enlarged,
         sub_triangles: linear.triangle_count(),
@@ -205,11 +233,13 @@ fn too_coarse(size: f64, distance: f64) -> String {
     )
 }
 
-fn too_coarse_for_spikes(size: f64, spikes: usize) -> String {
+/// What may go wrong where the least size stands in the way of smaller ones.
+fn held_up(least: f64, places: usize, first: &SizedPlace) -> String {
+    let [x, y, z] = first.at;
     format!(
-        "the edge length {size:.4e} is too long for {spikes} places in spikes and pits, of which remesh.geo looks after \
-         {MOST_SPIKES}: others may be cut off; give --size {:.4e} or less",
-        0.5 * size
+        "at {places} places elements of less than the least edge length {least:.4e} are needed, the first at ({x:.4e}, {y:.4e}, \
+         {z:.4e}), of {:.4e}: elements may be bad there, or parts lost; give a smaller --size-min",
+        first.size
     )
 }
 

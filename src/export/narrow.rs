@@ -2,10 +2,10 @@
 //! chart passes close to itself.
 
 use super::gmsh::area_of;
-use crate::formats::gmsh::{self, Ball};
 use planish_core::CertifiedChart;
 use planish_core::atlas::Chart;
 use planish_core::certified::NARROW;
+use planish_core::measure::sizes::SizedPlace;
 use planish_core::mesh::SurfaceMesh;
 use planish_core::seams::{Curve, Gap, Passage, SeamNetwork};
 use planish_core::topology::ChartId;
@@ -50,12 +50,19 @@ const CLOSE: f64 = 1.5;
 /// How far smaller elements reach around a place, in their sizes: an edge on either side of the middle one.
 const REACH: f64 = 2.0;
 
+/// The sizes of narrow places: the size halved so often at most, to a thousandth. By experience: elements of less could
+/// outnumber all others.
+const HALVINGS: u32 = 10;
+
 /// Where elements are smaller, and how small.
+#[derive(Default)]
 pub(super) struct Places {
-    /// Around curves, and in charts.
-    pub narrow: Vec<gmsh::Narrow>,
-    /// Around places on curves.
-    pub balls: Vec<Ball>,
+    /// The places.
+    pub sized: Vec<SizedPlace>,
+    /// How many curves they run along.
+    pub curves: usize,
+    /// How many of the places are where a boundary passes close to itself.
+    pub gaps: usize,
 }
 
 /// The places that are narrower than elements of the size, or small. `adapted` are the charts that MeshAdapt makes, ascending.
@@ -68,13 +75,80 @@ pub(super) fn places(
 ) -> Places {
     let extents: Vec<Extent> = charts.iter().map(|chart| Extent::of(chart.chart(), network)).collect();
     let mut wanted = wanted_sizes(&extents, network);
-    let balls = balls(mesh, &extents, network, size, &mut wanted);
-    Places { narrow: narrow(&extents, network, adapted, size, &wanted), balls }
+    let mut sized = gaps(mesh, &extents, network, size, &mut wanted);
+    let mut places = Places { gaps: sized.len(), ..Places::default() };
+    for (curve, wanted) in network.curves().iter().zip(&wanted) {
+        if let Some(halvings) = halvings_along(size, *wanted, curve.length()) {
+            places.curves += 1;
+            sized.extend(along_curve(mesh, curve, halved(size, halvings)));
+        }
+    }
+    for (extent, chart) in extents.iter().zip(charts) {
+        if let Some(halvings) = halvings_inside(extent, adapted, size) {
+            sized.extend(over_chart(chart.chart(), halved(size, halvings)));
+        }
+    }
+    Places { sized, ..places }
 }
 
-/// Balls around the places where boundaries pass close to themselves, but where the sizes `wanted` along the curves see to
-/// that; those are lowered where half of a curve is as narrow.
-fn balls(mesh: &SurfaceMesh, extents: &[Extent], network: &SeamNetwork, size: f64, wanted: &mut [f64]) -> Vec<Ball> {
+/// The size, halved so often.
+fn halved(size: f64, halvings: u32) -> f64 {
+    size * 0.5_f64.powi(halvings as i32)
+}
+
+/// Places along a curve, no farther apart than the size that they ask for.
+fn along_curve(mesh: &SurfaceMesh, curve: &Curve, size: f64) -> Vec<SizedPlace> {
+    let mut places = Vec::new();
+    for ends in curve.vertices().windows(2) {
+        let [from, to] = [ends[0], ends[1]].map(|v| mesh.points()[v.index()]);
+        let steps = (distance(from, to) / size).ceil().max(1.0) as u32;
+        for step in 0..=steps {
+            let t = f64::from(step) / f64::from(steps);
+            let at = [0, 1, 2].map(|k| from[k] + t * (to[k] - from[k]));
+            places.push(SizedPlace { at, size, reach: size });
+        }
+    }
+    // Of segments that are shorter than that, the last place is far enough for many.
+    let mut last: Option<Vec3> = None;
+    places.retain(|place| {
+        let is_far = last.is_none_or(|last| distance(last, place.at) >= 0.5 * size);
+        last = if is_far { Some(place.at) } else { last };
+        is_far
+    });
+    places
+}
+
+/// Places all over a chart, no farther apart than the size that they ask for; a small chart, so that they are not many. Triangles
+/// may be needles, of which a row along the longest side is enough.
+fn over_chart(chart: &Chart, size: f64) -> Vec<SizedPlace> {
+    let mut places = Vec::new();
+    for face in 0..chart.triangles().len() {
+        let corners = chart.corners(face);
+        let lengths = [0, 1, 2].map(|k| distance(corners[k], corners[(k + 1) % 3]));
+        let longest = (1..3).fold(0, |best, k| if lengths[k] > lengths[best] { k } else { best });
+        let [a, b, c] = [0, 1, 2].map(|k| corners[(longest + k) % 3]);
+        let steps = |length: f64| (length / size).ceil().clamp(1.0, MOST_EDGES) as u32;
+        let height = 2.0 * chart.area(face) / lengths[longest];
+        let (along, across) = (steps(lengths[longest]), steps(height));
+        for (i, j) in (0..=along).flat_map(|i| (0..=across).map(move |j| (i, j))) {
+            let t = f64::from(j) / f64::from(across);
+            let s = f64::from(i) / f64::from(along) * (1.0 - t);
+            let at = [0, 1, 2].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]));
+            places.push(SizedPlace { at, size, reach: size });
+        }
+    }
+    places
+}
+
+/// The places where boundaries pass close to themselves, but where the sizes `wanted` along the curves see to that; those are
+/// lowered where half of a curve is as narrow.
+fn gaps(
+    mesh: &SurfaceMesh,
+    extents: &[Extent],
+    network: &SeamNetwork,
+    size: f64,
+    wanted: &mut [f64],
+) -> Vec<SizedPlace> {
     let needed = |width: f64| width.max(LEAST * size);
     let mut of_curves: BTreeMap<usize, Vec<Place>> = BTreeMap::new();
     // Charts that are as narrow all over have elements as small along all of their curves already.
@@ -100,7 +174,8 @@ fn balls(mesh: &SurfaceMesh, extents: &[Extent], network: &SeamNetwork, size: f6
         places.extend(spread(of_curve, PLACES_PER_CURVE));
     }
     // Curves meet, and pass each other.
-    spread(places, MOST_PLACES).into_iter().map(|place| place.ball(size)).collect()
+    let sized = |place: Place| SizedPlace { at: place.at, size: place.size, reach: REACH * place.size };
+    spread(places, MOST_PLACES).into_iter().map(sized).collect()
 }
 
 /// The least width that half of the length of a curve does not exceed; none where less of it is narrow.
@@ -124,14 +199,6 @@ struct Place {
     size: f64,
 }
 
-impl Place {
-    /// The ball around it, from which elements grow up to `size`.
-    fn ball(self, size: f64) -> Ball {
-        let thickness = (size - self.size) / gmsh::Narrow::GRADATION;
-        Ball { centre: self.at, radius: REACH * self.size, thickness, size: self.size }
-    }
-}
-
 /// Whether elements of the size that a curve gets are small enough.
 fn is_enough(needed: f64, size: f64, wanted: f64, length: f64) -> bool {
     along(size, wanted, length) < CLOSE * needed
@@ -139,15 +206,12 @@ fn is_enough(needed: f64, size: f64, wanted: f64, length: f64) -> bool {
 
 /// The size that elements along a curve get.
 fn along(size: f64, wanted: f64, length: f64) -> f64 {
-    match class_along(size, wanted, length) {
-        Some(class) => size * 0.5_f64.powi(class as i32 + 1),
-        None => size,
-    }
+    halvings_along(size, wanted, length).map_or(size, |halvings| halved(size, halvings))
 }
 
-/// The class of a curve: however narrow the place, no smaller than gives [`MOST_EDGES`].
-fn class_along(size: f64, wanted: f64, length: f64) -> Option<usize> {
-    size_class(size, wanted.max(length / MOST_EDGES))
+/// How often the size is halved along a curve: however narrow the place, no more often than gives [`MOST_EDGES`].
+fn halvings_along(size: f64, wanted: f64, length: f64) -> Option<u32> {
+    halvings(size, wanted.max(length / MOST_EDGES))
 }
 
 /// The narrowest places, none in the ball of another; so many at most.
@@ -169,48 +233,21 @@ fn spread(mut places: Vec<Place>, most: usize) -> Vec<Place> {
     apart
 }
 
-/// The curves along narrow places and the small charts, by the size of elements there: half of `size`, a quarter, and so on.
-fn narrow(
-    extents: &[Extent],
-    network: &SeamNetwork,
-    adapted: &[usize],
-    size: f64,
-    wanted: &[f64],
-) -> Vec<gmsh::Narrow> {
-    let mut found = Vec::new();
-    for halvings in 1..=gmsh::Narrow::HALVINGS {
-        found.push(gmsh::Narrow { size: size * 0.5_f64.powi(halvings as i32), ..gmsh::Narrow::default() });
+/// How often the size is halved all over a chart; none where it is not, as larger ones have smaller elements along their curves
+/// only.
+fn halvings_inside(extent: &Extent, adapted: &[usize], size: f64) -> Option<u32> {
+    if extent.area > SMALL * size * size {
+        return None;
     }
-    for (curve, wanted) in network.curves().iter().zip(wanted) {
-        if let Some(class) = class_along(size, *wanted, curve.length()) {
-            found[class].curves.push(curve.id().index());
-            found[class].longest = found[class].longest.max(curve.length());
-        }
-    }
-    for Extent { chart, area, perimeter } in extents.iter().copied() {
-        // Larger ones have smaller elements along their curves only.
-        if area > SMALL * size * size {
-            continue;
-        }
-        let is_adapted = adapted.binary_search(&chart.index()).is_ok();
-        let inside = if is_adapted { 0.5 * size } else { size };
-        if let Some(class) = size_class(size, inside.min(perimeter / EDGES_PER_LOOP)) {
-            found[class].surfaces.push(chart.index());
-        }
-    }
-    found.retain(|n| !n.curves.is_empty() || !n.surfaces.is_empty());
-    found
+    let is_adapted = adapted.binary_search(&extent.chart.index()).is_ok();
+    let inside = if is_adapted { 0.5 * size } else { size };
+    halvings(size, inside.min(extent.perimeter / EDGES_PER_LOOP))
 }
 
-/// The class for elements of the `wanted` size: 0 for half of `size`, 1 for a quarter, and so on; none where `size` itself
-/// will do.
-fn size_class(size: f64, wanted: f64) -> Option<usize> {
-    if wanted < NARROW * size {
-        let halvings = (size / wanted).log2().round();
-        Some(halvings.clamp(1.0, f64::from(gmsh::Narrow::HALVINGS)) as usize - 1)
-    } else {
-        None
-    }
+/// How often `size` is halved for elements of the `wanted` one; none where it is not.
+fn halvings(size: f64, wanted: f64) -> Option<u32> {
+    let halvings = (size / wanted).log2().round().clamp(1.0, f64::from(HALVINGS));
+    (wanted < NARROW * size).then_some(halvings as u32)
 }
 
 /// The length of a loop.

@@ -1,6 +1,7 @@
 //! What readers are given, and what they give.
 
-use crate::settings::Limits;
+use super::labels::Label;
+use crate::settings::{LabelSource, Limits};
 use planish_core::mesh::TriangleSoup;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -20,6 +21,17 @@ pub struct Source<'a> {
     pub limits: &'a Limits,
     /// The files beside it.
     pub beside: &'a dyn SiblingFiles,
+    /// What names parts of the surface.
+    pub labels: &'a LabelSource,
+    /// The array of points that tells sizes, where one is asked for.
+    pub sizes: Option<&'a str>,
+}
+
+impl<'a> Source<'a> {
+    /// A file with nothing beside it, whose parts have the names that are usual.
+    pub fn alone(bytes: &'a [u8], limits: &'a Limits) -> Self {
+        Self { bytes, limits, beside: &NoSiblings, labels: &LabelSource::Usual, sizes: None }
+    }
 }
 
 /// Gives the bytes of a file that lies beside the one that is read.
@@ -91,6 +103,9 @@ pub struct Notes {
     pub units: Option<String>,
     /// Names of solids, objects, groups, in the order of the file; the first 100 of them.
     pub names: Vec<String>,
+    /// The labels of triangles, in the order of their first triangles: the soup's labels are positions in this list.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub labels: Vec<Label>,
     /// Faces with more than three corners, which were cut into triangles.
     pub polygons: usize,
     /// How many of these cross themselves, or are too intricate to be cut with care: their triangles may fold.

@@ -1,5 +1,6 @@
 //! How every reader ends: points, triangles and notes become what a file holds, or its refusal.
 
+use super::labels::Labels;
 use super::location::Location;
 use super::{Content, Notes, ReadError};
 use planish_core::mesh::{SoupError, TriangleSoup};
@@ -31,7 +32,8 @@ impl BadPoints {
 pub(super) fn content(
     points: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
-    notes: Notes,
+    labels: Labels,
+    mut notes: Notes,
     bad: &BadPoints,
 ) -> Result<Content, ReadError> {
     let mut found = Vec::new();
@@ -48,7 +50,7 @@ pub(super) fn content(
         return Err(ReadError::NoSurface { found: found.join(", "), remedy, notes: Box::new(notes) });
     }
     let error = match TriangleSoup::new(points, triangles) {
-        Ok(soup) => return Ok(Content { soup, notes }),
+        Ok(soup) => return Ok(Content { soup: labels.apply(soup, &mut notes), notes }),
         Err(error) => error,
     };
     let location = match error {
@@ -121,6 +123,7 @@ fn plural(name: String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::LabelSource;
 
     #[test]
     fn elements_are_counted_in_words() {
@@ -145,7 +148,8 @@ mod tests {
         let with = |kind: &str, triangles: Vec<[u32; 3]>| {
             let mut notes = Notes::new("a format");
             notes.skip(kind, 11_000);
-            content(vec![[0.0; 3]; 3], triangles, notes, &BadPoints::default())
+            let labels = Labels::new(&LabelSource::Usual);
+            content(vec![[0.0; 3]; 3], triangles, labels, notes, &BadPoints::default())
         };
         let kinds = [
             ("tetrahedron", "only 11,000 tetrahedra; their surface", true),

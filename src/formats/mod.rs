@@ -4,32 +4,42 @@ mod content;
 mod finish;
 mod gltf;
 pub mod gmsh;
+mod joined;
+mod labels;
+pub mod layout;
 mod location;
 mod medit;
 mod msh;
 #[cfg(test)]
 #[path = "../../tests/fuzz/mutate/mod.rs"]
 mod mutate;
+mod numbered;
 mod obj;
 mod off;
 mod patches;
 mod ply;
+mod point_sizes;
 mod polygon;
 mod scalar;
 mod sniff;
 mod stl;
+mod texture;
 mod value_error;
 mod vtk;
 mod words;
 
 use crate::outcome::{Code, Reason};
-pub use crate::settings::Limits;
+pub use crate::settings::{LabelSource, Limits};
 pub use content::{Content, NoSiblings, Notes, SiblingFiles, Source, TooMany};
+pub use gltf::glb;
+pub use labels::{Label, LabelError};
 use location::Location;
+pub use obj::surface as surface_obj;
 pub use patches::Patches;
 use planish_core::mesh::SoupError;
+pub use point_sizes::SizeError;
 use std::path::Path;
-pub use vtk::{layout, vtm, vtp, vtu};
+pub use vtk::{vtm, vtp, vtu, welded};
 
 /// A format that can be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +89,11 @@ impl Format {
             // Quads in text of six decimals, each line with a reference: 34.
             Self::Medit => 34,
         }
+    }
+
+    /// Whether arrays of points are read, which may tell sizes.
+    fn has_point_arrays(self) -> bool {
+        matches!(self, Self::Vtk | Self::Vtu | Self::Vtp | Self::Msh)
     }
 }
 
@@ -192,6 +207,12 @@ pub enum ReadError {
     /// Not a file of MEDIT.
     #[error(transparent)]
     Medit(#[from] medit::MeditError),
+    /// What shall name parts of the surface is not there.
+    #[error(transparent)]
+    Label(#[from] LabelError),
+    /// What shall tell sizes is not there, or cannot.
+    #[error(transparent)]
+    Size(#[from] SizeError),
     /// There are elements, but none of a surface.
     #[error("the file holds no surface, only {found}; {remedy}")]
     NoSurface {
@@ -228,6 +249,8 @@ impl ReadError {
             Self::Msh(e) => (e.code(), e.location()),
             Self::Off(e) => (e.code(), e.location()),
             Self::Medit(e) => (e.code(), e.location()),
+            Self::Label(_) => (Code::NoLabels, None),
+            Self::Size(_) => (Code::NoSizes, None),
             Self::NoSurface { .. } => (Code::NoTriangles, None),
             Self::Soup { error, location, .. } => {
                 let (code, element) = soup_reason(error);
@@ -341,7 +364,11 @@ pub fn read(format: Format, source: &Source) -> Result<Content, ReadError> {
     }
     // Editors put a mark before text. The other readers pass over it themselves: binary STL files may begin with anything.
     let unmarked = Source { bytes: bytes.strip_prefix(sniff::MARK).unwrap_or(bytes), ..*source };
-    match sniffed.unwrap_or(format) {
+    let format = sniffed.unwrap_or(format);
+    if let Some(asked) = source.sizes.filter(|_| !format.has_point_arrays()) {
+        return Err(SizeError::missing([].into_iter(), asked).into());
+    }
+    match format {
         Format::Stl => stl::read(source),
         Format::Obj => obj::read(source),
         Format::Gltf => gltf::read(source),
@@ -373,7 +400,7 @@ pub fn read_patches(format: Format, source: &Source) -> Result<Patches, ReadErro
 /// # Errors
 /// As [`read`].
 pub fn read_alone(format: Format, bytes: &[u8]) -> Result<Content, ReadError> {
-    read(format, &Source { bytes, limits: &Limits::default(), beside: &NoSiblings })
+    read(format, &Source::alone(bytes, &Limits::default()))
 }
 
 #[cfg(test)]

@@ -25,4 +25,9 @@ impl Scalar {
             Self::I64 | Self::U64 | Self::F64 => 8,
         }
     }
+
+    /// Whether it is a type of floating-point numbers.
+    pub fn is_float(self) -> bool {
+        matches!(self, Self::F32 | Self::F64)
+    }
 }

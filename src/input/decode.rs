@@ -21,7 +21,8 @@ pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -
     let refuse = |code, message: String| Err(Reason::at(code, message, Some("file name".to_owned())).into());
     match formats::kind(path) {
         Kind::Mesh(format) => {
-            let source = Source { bytes, limits: &settings.limits, beside: folder };
+            let sizes = settings.size_from.as_deref();
+            let source = Source { bytes, limits: &settings.limits, beside: folder, labels: &settings.labels, sizes };
             formats::read_or_tell(format, &source)
         }
         Kind::OtherMesh(e) => refuse(

@@ -222,7 +222,8 @@ mod tests {
             r#"{{"schema": 9, "planish": "7.1", "status": "certified", "outputs": [{output}], "more": 1}}"#
         ));
         let names: Vec<_> = own_files().expect("a result").into_iter().collect();
-        assert_eq!(names, ["hooks.json", "mesh.json", "report.json", "surface.vtu"]);
+        let finer = result_files::FINER;
+        assert_eq!(names, [&finer[..], &["hooks.json", "mesh.json", "report.json", "surface.vtu"]].concat());
     }
 
     #[test]

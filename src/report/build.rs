@@ -1,9 +1,10 @@
 //! From the core's numbers to the report's.
 
 use super::{
-    Boundary, BoundaryShape, Certificate, ChartBoundary, ChartReport, Counts, Distortion, Linear, Quadratic,
-    RepairedSurface, Repairs, Seam, Seams, Surface, Untangle,
+    Boundary, BoundaryShape, Certificate, ChartBoundary, ChartReport, Counts, Distortion, LabelReport, Linear,
+    Quadratic, RepairedSurface, Repairs, Seam, Seams, Surface, Untangle,
 };
+use crate::formats::Label;
 use crate::formats::layout::{Placement, layout};
 use planish_core::atlas::Chart;
 use planish_core::certified::BoundaryFound;
@@ -42,6 +43,19 @@ fn counts(c: &TopologySummary) -> Counts {
         nonmanifold_vertices: c.nonmanifold_vertices,
         inconsistent_edges: c.inconsistent_edges,
     }
+}
+
+/// The parts of the surface that have names, with their areas.
+pub fn labels(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<LabelReport> {
+    let report = |label: &Label| LabelReport { label: label.clone(), charts: 0, triangles: 0, area: 0.0 };
+    let mut reports: Vec<LabelReport> = labels.iter().map(report).collect();
+    for chart in atlas.charts() {
+        let Some(report) = atlas.label(chart.id()).and_then(|label| reports.get_mut(label as usize)) else { continue };
+        report.charts += 1;
+        report.triangles += chart.chart().triangles().len();
+        report.area += chart.chart().true_area();
+    }
+    reports
 }
 
 /// What repair did.

@@ -2,8 +2,8 @@
 //! the end. So a report never holds what a stage that broke down has left behind.
 
 use super::{
-    ChartReport, Decomposition, ExportReport, Input, Output, Refinement, RefusedComponent, Repairs, Report, Seams,
-    Surface, Warning,
+    ChartReport, Decomposition, ExportReport, Input, LabelReport, Output, Refinement, RefusedComponent, Repairs,
+    Report, Seams, Surface, Warning,
 };
 use crate::formats::Notes;
 use crate::outcome::{Reason, Status};
@@ -41,6 +41,8 @@ pub struct SurfaceFacts {
 /// What is known of an atlas.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CertifiedFacts {
+    /// The parts of its surface that have names.
+    pub labels: Vec<LabelReport>,
     /// Its charts.
     pub charts: Vec<ChartReport>,
     /// How many of them there are more than decomposition made.
@@ -92,11 +94,11 @@ impl Facts {
 
     /// The report of an input that is certified, but for components that are refused.
     pub fn certified(self, settings: &Settings, certified: CertifiedFacts) -> Report {
-        let CertifiedFacts { charts, charts_by_splitting, seams, hand_off, outputs } = certified;
+        let CertifiedFacts { labels, charts, charts_by_splitting, seams, hand_off, outputs } = certified;
         let report = self.report(settings);
         let decomposition = report.decomposition.map(|d| Decomposition { charts_by_splitting, ..d });
         let status = Status::Certified;
-        Report { status, decomposition, charts, seams, hand_off, outputs, ..report }
+        Report { status, decomposition, labels, charts, seams, hand_off, outputs, ..report }
     }
 
     /// The report of an input that is refused, or failed, for this reason.

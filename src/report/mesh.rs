@@ -1,7 +1,7 @@
 //! mesh.json: what `planish check --mesh` found. The schema is in docs/mesh.schema.json; within version 1 it only grows.
 
 use super::Output;
-use planish_core::soundness::{Defect, Findings};
+use planish_core::soundness::{Defect, Deviation, Farthest, Findings};
 use planish_core::vec3::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -44,6 +44,9 @@ pub struct MeshReport {
     pub mesh_to_surface: Distance,
     /// The point of the surface that is farthest from the mesh.
     pub surface_to_mesh: Distance,
+    /// How far both are from each other everywhere; null where that was not asked for.
+    #[serde(default)]
+    pub deviation: Option<DeviationReport>,
     /// Pairs of elements that cross as those of the surface do.
     pub crossings_of_surface: usize,
     /// The shapes of elements.
@@ -72,6 +75,23 @@ pub struct Distance {
     pub distance: f64,
     /// The point.
     pub at: Vec3,
+}
+
+/// How far mesh and surface are from each other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviationReport {
+    /// What may be, in the unit of the surface.
+    pub limit: f64,
+    /// The point of the mesh that is farthest from the surface, inside elements, too.
+    pub mesh_to_surface: Distance,
+    /// The point of the surface that is farthest from the mesh.
+    pub surface_to_mesh: Distance,
+    /// At how many elements more is found than may be.
+    pub elements: usize,
+    /// The worst of these places.
+    pub places: Vec<Distance>,
+    /// The places at which elements would have to be smaller than the least edge length allows; where smaller ones were asked for.
+    pub held: Vec<Distance>,
 }
 
 /// Twice the radius of the inscribed circle over that of the circumscribed one.
@@ -115,7 +135,7 @@ impl MeshReport {
     /// The report of what was found, for a mesh of `size` held against a surface.
     pub fn new(mesh: Output, surface: Output, size: f64, min_gamma: f64, found: &Findings) -> Self {
         let defect = |d: &Defect| MeshDefect { kind: kind(d).to_owned(), message: d.to_string(), at: d.at() };
-        let distance = |d: &planish_core::soundness::Farthest| Distance { distance: d.distance, at: d.at };
+        let distance = |d: &Farthest| Distance { distance: d.distance, at: d.at };
         let (edges, below) = (found.edges, found.bad.len());
         Self {
             schema: SCHEMA,
@@ -133,6 +153,7 @@ impl MeshReport {
             area_ratio: found.area_ratio,
             mesh_to_surface: distance(&found.mesh_to_surface),
             surface_to_mesh: distance(&found.surface_to_mesh),
+            deviation: found.deviation.as_ref().map(deviation),
             crossings_of_surface: found.crossings_of_surface,
             gamma: Gamma {
                 min: found.gamma_min,
@@ -144,6 +165,21 @@ impl MeshReport {
             edges: Edges { min: edges.min, median: edges.median, max: edges.max, near_size: edges.near_size },
             places: places(found),
         }
+    }
+}
+
+/// How far mesh and surface are from each other, with the worst places.
+fn deviation(found: &Deviation) -> DeviationReport {
+    let distance = |d: &Farthest| Distance { distance: d.distance, at: d.at };
+    let mut worst: Vec<_> = found.too_far.iter().collect();
+    worst.sort_by(|a, b| b.distance.total_cmp(&a.distance).then(a.triangle.cmp(&b.triangle)));
+    DeviationReport {
+        limit: found.limit,
+        mesh_to_surface: distance(&found.mesh_to_surface),
+        surface_to_mesh: distance(&found.surface_to_mesh),
+        elements: found.too_far.len(),
+        places: worst.iter().take(PLACES).map(|t| Distance { distance: t.distance, at: t.at }).collect(),
+        held: Vec::new(),
     }
 }
 
@@ -170,6 +206,7 @@ fn kind(defect: &Defect) -> &'static str {
         Defect::Topology { .. } => "topology",
         Defect::OffSurface { .. } => "off_surface",
         Defect::Lost { .. } => "lost",
+        Defect::Deviates { .. } => "deviates",
         Defect::Area { .. } => "area",
         Defect::ChartArea { .. } => "chart_area",
         Defect::Crossing { .. } => "crossing",

@@ -6,11 +6,11 @@ mod facts;
 pub mod mesh;
 mod warnings;
 
-use crate::formats::Notes;
+use crate::formats::{Label, Notes};
 use crate::outcome::{Reason, Status};
-use crate::settings::{self, Settings};
+use crate::settings::{self, LabelSource, Settings};
 use crate::system::escape::printable_json;
-pub use build::{certificate, chart_checksum, charts, repairs, seams, surface};
+pub use build::{certificate, chart_checksum, charts, labels, repairs, seams, surface};
 pub use facts::{CertifiedFacts, Facts, SurfaceFacts};
 use planish_core::Order;
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,9 @@ pub struct Report {
     /// What was refined; null where no map was tried.
     #[serde(default)]
     pub refinement: Option<Refinement>,
+    /// The parts of the surface that have names.
+    #[serde(default)]
+    pub labels: Vec<LabelReport>,
     /// The charts.
     pub charts: Vec<ChartReport>,
     /// The curves between charts.
@@ -104,8 +107,43 @@ pub struct ResultSettings {
     pub max_triangles: Option<usize>,
     /// Mesher to which the result is handed.
     pub hand_off: settings::ExportTarget,
+    /// Files for other programs, beside those of every result.
+    #[serde(default)]
+    pub also: Vec<settings::Also>,
     /// Edge length that was asked for; null for the default.
     pub size: Option<f64>,
+    /// Edges per full turn that were asked for; null: none.
+    #[serde(default)]
+    pub size_curvature: Option<f64>,
+    /// Least edge length; null: none.
+    #[serde(default)]
+    pub size_min: Option<f64>,
+    /// The array of points that tells edge lengths; null: none.
+    #[serde(default)]
+    pub size_from: Option<String>,
+    /// How much longer edges may become over a distance; null in results of older versions.
+    #[serde(default)]
+    pub gradation: Option<f64>,
+    /// How far mesh and surface may be from each other; null: not asked for.
+    #[serde(default)]
+    pub deviation: Option<f64>,
+    /// Order of the elements of the mesh to be made.
+    #[serde(default = "linear")]
+    pub mesh_order: u8,
+    /// What names parts of the surface, where it was asked for.
+    #[serde(default)]
+    pub label: Option<String>,
+    /// Whether names of parts count for nothing.
+    #[serde(default)]
+    pub ignore_labels: bool,
+    /// Whether curves along features have a group in files for meshers.
+    #[serde(default)]
+    pub names_features: bool,
+}
+
+/// What meshes had before another order could be asked for.
+fn linear() -> u8 {
+    1
 }
 
 /// What no settings say.
@@ -125,7 +163,20 @@ impl From<&Settings> for ResultSettings {
             max_area_ratio: settings.max_area_ratio,
             max_triangles: settings.max_triangles,
             hand_off: settings.hand_off,
+            also: settings.also.clone(),
             size: settings.size,
+            size_curvature: settings.size_curvature,
+            size_min: settings.size_min,
+            size_from: settings.size_from.clone(),
+            gradation: Some(settings.gradation),
+            deviation: settings.deviation,
+            mesh_order: settings.mesh_order,
+            label: match &settings.labels {
+                LabelSource::Array(label) => Some(label.clone()),
+                LabelSource::Usual | LabelSource::Ignored => None,
+            },
+            ignore_labels: settings.labels == LabelSource::Ignored,
+            names_features: settings.names_features,
         }
     }
 }
@@ -143,10 +194,37 @@ impl ResultSettings {
             max_area_ratio: self.max_area_ratio,
             max_triangles: self.max_triangles,
             hand_off: self.hand_off,
+            also: self.also.clone(),
             size: self.size,
+            size_curvature: self.size_curvature,
+            size_min: self.size_min,
+            size_from: self.size_from.clone(),
+            gradation: self.gradation.unwrap_or(settings.gradation),
+            deviation: self.deviation,
+            mesh_order: self.mesh_order,
+            labels: match &self.label {
+                Some(label) => LabelSource::Array(label.clone()),
+                None if self.ignore_labels => LabelSource::Ignored,
+                None => LabelSource::Usual,
+            },
+            names_features: self.names_features,
             ..settings
         }
     }
+}
+
+/// A part of the surface that has a name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LabelReport {
+    /// Its tag, name and group.
+    #[serde(flatten)]
+    pub label: Label,
+    /// How many charts it is made of.
+    pub charts: usize,
+    /// How many triangles, after refinement.
+    pub triangles: usize,
+    /// Its area, in the unit of the input, squared.
+    pub area: f64,
 }
 
 /// A surface before and after repair.
@@ -549,6 +627,15 @@ pub struct ExportReport {
     /// Spikes and pits, where remesh.geo asks for smaller elements.
     #[serde(default)]
     pub spikes: usize,
+    /// The least edge length that it asks for; null where all are alike.
+    #[serde(default)]
+    pub least_size: Option<f64>,
+    /// Places where smaller elements are needed than the least edge length allows.
+    #[serde(default)]
+    pub held_places: usize,
+    /// The first of them.
+    #[serde(default)]
+    pub held: Vec<HeldPlace>,
     /// By how much lengths are multiplied in the atlas that remesh.geo merges; 1: that is atlas.msh.
     #[serde(default = "unchanged")]
     pub enlarged: f64,
@@ -560,6 +647,15 @@ pub struct ExportReport {
     pub warning: Option<String>,
     /// Why there is no hand-off.
     pub failure: Option<String>,
+}
+
+/// A place where smaller elements are needed than may be.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeldPlace {
+    /// Where, in the unit of the input.
+    pub at: [f64; 3],
+    /// The edge length that is needed.
+    pub size: f64,
 }
 
 /// What earlier versions did to lengths.
@@ -607,6 +703,7 @@ impl Report {
             warnings: vec![],
             decomposition: None,
             refinement: None,
+            labels: vec![],
             charts: vec![],
             seams: Seams::default(),
             hand_off: None,

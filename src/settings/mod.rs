@@ -15,7 +15,10 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 pub use template::{Part, Placeholder, Template, TemplateError};
-pub use values::{Boundary, ExportTarget, FeatureAngle, Inputs, Log, Off, RawCommand, RawLimits, Refine, Refused};
+pub use values::{
+    Also, AlsoFiles, Boundary, ExportTarget, FeatureAngle, Inputs, LabelSource, Log, Off, RawCommand, RawLimits,
+    Refine, Refused,
+};
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in
 /// the file alone.
@@ -47,8 +50,31 @@ pub struct RawSettings {
     /// Meshers to which results are handed.
     #[serde(rename = "hand-off")]
     pub hand_off: Option<ExportTarget>,
+    /// Files for other programs, beside those of every result.
+    pub also: Option<AlsoFiles>,
     /// Edge length of the mesh to be made.
     pub size: Option<f64>,
+    /// Edges of that mesh in a full turn around a bend.
+    #[serde(rename = "size-curvature")]
+    pub size_curvature: Option<f64>,
+    /// Least edge length.
+    #[serde(rename = "size-min")]
+    pub size_min: Option<f64>,
+    /// The array of points that tells edge lengths, by its name in the file.
+    #[serde(rename = "size-from")]
+    pub size_from: Option<String>,
+    /// How much longer edges may become over a distance.
+    pub gradation: Option<f64>,
+    /// How far mesh and surface may be from each other.
+    pub deviation: Option<f64>,
+    /// Order of the elements of that mesh: 1 or 2.
+    #[serde(rename = "mesh-order")]
+    pub mesh_order: Option<u8>,
+    /// What names parts of a surface, by its name in the file.
+    pub label: Option<String>,
+    /// Names of parts count for nothing.
+    #[serde(rename = "ignore-labels")]
+    pub ignore_labels: Option<bool>,
     /// Process inputs whose output is up to date, too.
     pub force: Option<bool>,
     /// How much is computed at once.
@@ -110,6 +136,8 @@ pub struct Settings {
     pub weld: f64,
     /// Dihedral angle of feature edges, in degrees; none: there are none.
     pub feature_angle: Option<f64>,
+    /// Whether the angle was asked for: curves along features have a group in files for meshers then.
+    pub names_features: bool,
     /// Whether holes of charts must be holes of the surface.
     pub strict_disks: bool,
     /// Largest area ratio of a chart.
@@ -118,8 +146,24 @@ pub struct Settings {
     pub max_triangles: Option<usize>,
     /// Meshers to which results are handed.
     pub hand_off: ExportTarget,
+    /// Files for other programs, beside those of every result: each once, in their order.
+    pub also: Vec<Also>,
     /// Edge length of the mesh to be made, in the unit of the input; without it, one is chosen.
     pub size: Option<f64>,
+    /// Edges of that mesh in a full turn around a bend; none: bends get no more than the rest.
+    pub size_curvature: Option<f64>,
+    /// Least edge length; none: any that narrow places need.
+    pub size_min: Option<f64>,
+    /// The array of points that tells edge lengths, by its name in the file; none: no array does.
+    pub size_from: Option<String>,
+    /// How much longer edges may become over a distance: by this times the distance.
+    pub gradation: f64,
+    /// How far mesh and surface may be from each other, in the unit of the input; none: as far as edges make them.
+    pub deviation: Option<f64>,
+    /// Order of the elements of that mesh: 1 or 2.
+    pub mesh_order: u8,
+    /// What names parts of a surface: borders between them become seams.
+    pub labels: LabelSource,
     /// Process inputs whose output is up to date, too.
     pub force: bool,
     /// How much is computed at once.
@@ -204,6 +248,36 @@ pub enum SettingsError {
     /// No triangle is allowed.
     #[error("max-triangles is 0; a chart needs at least one")]
     Triangles,
+    /// A full turn of so many edges is none.
+    #[error(
+        "size-curvature is {0}; it must lie between {LEAST_PER_TURN} and {MOST_PER_TURN}: the edges of a full turn"
+    )]
+    SizeCurvature(f64),
+    /// The least edge length is none.
+    #[error("size-min is {0}; it must be a positive number: the least edge length in the unit of the input")]
+    SizeMin(f64),
+    /// No edge could be long enough.
+    #[error("size-min is {least}, and size is {size}: give a least edge length that is not above the largest")]
+    SizesCross {
+        /// The least edge length.
+        least: f64,
+        /// The largest.
+        size: f64,
+    },
+    /// The gradation is out of range.
+    #[error(
+        "gradation is {0}; it must lie between {LEAST_GRADATION} and {MOST_GRADATION}: by how much edges become longer per distance"
+    )]
+    Gradation(f64),
+    /// The deviation is none.
+    #[error("deviation is {0}; it must be a positive number: a distance in the unit of the input")]
+    Deviation(f64),
+    /// The order of the mesh is not 1 or 2.
+    #[error("mesh-order is {0}; it must be 1 (straight triangles) or 2 (curved ones)")]
+    MeshOrder(u8),
+    /// Labels are both asked for and ignored.
+    #[error("label and ignore-labels are both given; keep the one that is meant")]
+    Labels,
     /// The edge length is none.
     #[error("size is {0}; it must be a positive number: the edge length in the unit of the input")]
     Size(f64),
@@ -252,6 +326,18 @@ pub enum SettingsError {
         error: Box<toml::de::Error>,
     },
 }
+
+/// Fewer edges make no turn, more are a slip of the finger.
+const LEAST_PER_TURN: f64 = 3.0;
+const MOST_PER_TURN: f64 = 10_000.0;
+
+/// Lower makes nearly all elements as small as the smallest, higher makes neighbours lean.
+const LEAST_GRADATION: f64 = 0.01;
+const MOST_GRADATION: f64 = 10.0;
+
+/// How much longer edges become over a distance, where nothing is said. Around narrow places: less makes more small elements, more
+/// makes elements lean where sizes change.
+pub const USUAL_GRADATION: f64 = 0.4;
 
 /// More computations at once than this are a slip of the finger.
 const MOST_JOBS: usize = 1024;
@@ -305,6 +391,7 @@ impl RawSettings {
     /// assert_eq!(said.feature_angle, Some(FeatureAngle::Off(Off::Off)));
     /// ```
     pub fn or(self, other: Self) -> Self {
+        let says_label = self.label.is_some();
         Self {
             out: self.out.or(other.out),
             order: self.order.or(other.order),
@@ -316,7 +403,17 @@ impl RawSettings {
             max_area_ratio: self.max_area_ratio.or(other.max_area_ratio),
             max_triangles: self.max_triangles.or(other.max_triangles),
             hand_off: self.hand_off.or(other.hand_off),
+            also: self.also.or(other.also),
             size: self.size.or(other.size),
+            size_curvature: self.size_curvature.or(other.size_curvature),
+            size_min: self.size_min.or(other.size_min),
+            size_from: self.size_from.or(other.size_from),
+            gradation: self.gradation.or(other.gradation),
+            deviation: self.deviation.or(other.deviation),
+            mesh_order: self.mesh_order.or(other.mesh_order),
+            // Who says one of both on the command line unsays the other in the file.
+            label: self.label.or(other.label.filter(|_| self.ignore_labels != Some(true))),
+            ignore_labels: self.ignore_labels.or(other.ignore_labels.filter(|_| !says_label)),
             force: self.force.or(other.force),
             jobs: self.jobs.or(other.jobs),
             commands: self.commands.or(other.commands),
@@ -392,6 +489,34 @@ impl RawSettings {
         if let Some(size) = self.size.filter(|s| !s.is_normal() || *s < 0.0) {
             return Err(SettingsError::Size(size));
         }
+        if let Some(edges) = self.size_curvature.filter(|n| !(LEAST_PER_TURN..=MOST_PER_TURN).contains(n)) {
+            return Err(SettingsError::SizeCurvature(edges));
+        }
+        if let Some(least) = self.size_min.filter(|s| !s.is_normal() || *s < 0.0) {
+            return Err(SettingsError::SizeMin(least));
+        }
+        if let (Some(least), Some(size)) = (self.size_min, self.size)
+            && least > size
+        {
+            return Err(SettingsError::SizesCross { least, size });
+        }
+        let gradation = self.gradation.unwrap_or(USUAL_GRADATION);
+        if !(LEAST_GRADATION..=MOST_GRADATION).contains(&gradation) {
+            return Err(SettingsError::Gradation(gradation));
+        }
+        if let Some(deviation) = self.deviation.filter(|d| !d.is_normal() || *d < 0.0) {
+            return Err(SettingsError::Deviation(deviation));
+        }
+        let mesh_order = self.mesh_order.unwrap_or(1);
+        if ![1, 2].contains(&mesh_order) {
+            return Err(SettingsError::MeshOrder(mesh_order));
+        }
+        let labels = match (self.label, self.ignore_labels.unwrap_or(false)) {
+            (Some(_), true) => return Err(SettingsError::Labels),
+            (Some(array), false) => LabelSource::Array(array),
+            (None, true) => LabelSource::Ignored,
+            (None, false) => LabelSource::Usual,
+        };
         let jobs = self.jobs.unwrap_or_else(processors);
         if !(1..=MOST_JOBS).contains(&jobs) {
             return Err(SettingsError::Jobs(jobs));
@@ -422,11 +547,20 @@ impl RawSettings {
             refine,
             weld,
             feature_angle,
+            names_features: self.feature_angle.is_some_and(|angle| angle.degrees().is_some()),
             strict_disks: self.strict_disks.unwrap_or(core.strict_disks),
             max_area_ratio,
             max_triangles: self.max_triangles,
             hand_off: self.hand_off.unwrap_or_default(),
+            also: self.also.unwrap_or_default().each_once(),
             size: self.size,
+            size_curvature: self.size_curvature,
+            size_min: self.size_min,
+            size_from: self.size_from,
+            gradation,
+            deviation: self.deviation,
+            mesh_order,
+            labels,
             force: self.force.unwrap_or(false),
             jobs,
             commands,

@@ -49,6 +49,93 @@ fn wrong_values_are_refused() {
     assert_eq!((file.hand_off, file.size), (Some(ExportTarget::None), Some(0.5)));
 }
 
+/// The text of planish.toml, and the refusal that it leads to; none where it is in range.
+fn refusal(text: &str) -> Option<String> {
+    let said: RawSettings = toml::from_str(text).unwrap_or_else(|e| panic!("{text}: {e}"));
+    said.check().err().map(|error| error.to_string())
+}
+
+#[test]
+fn sizes_of_the_mesh_are_checked() {
+    let fine = [
+        "size-curvature = 3\nsize-min = 1e-9\nsize = 1e-9\ngradation = 0.01\ndeviation = 1e-300\nmesh-order = 1",
+        "size-curvature = 10000\nsize-min = 5\ngradation = 10\ndeviation = 1e300\nmesh-order = 2\nsize-from = \"h\"",
+    ];
+    assert_eq!(fine.map(refusal), [None, None]);
+    let wrong = [
+        ("size-curvature", &["2.9", "10001", "-8", "nan", "inf"][..], "it must lie between 3 and 10000"),
+        ("size-min", &["0", "-1", "nan", "inf", "1e-320"], "it must be a positive number: the least edge length"),
+        ("gradation", &["0", "0.009", "11", "-0.4", "nan"], "it must lie between 0.01 and 10"),
+        ("deviation", &["0", "-1", "nan", "inf", "1e-320"], "it must be a positive number: a distance"),
+        ("mesh-order", &["0", "3"], "it must be 1 (straight triangles) or 2"),
+    ];
+    for (setting, values, told) in wrong {
+        for value in values {
+            let value = if setting == "mesh-order" || value.contains(['n', '.', 'e']) {
+                (*value).to_owned()
+            } else {
+                format!("{value}.0")
+            };
+            let refused = refusal(&format!("{setting} = {value}")).unwrap_or_else(|| panic!("{setting} = {value}"));
+            assert!(refused.starts_with(&format!("{setting} is ")) && refused.contains(told), "{refused}");
+        }
+    }
+    let crossed = refusal("size-min = 2.0\nsize = 1.0").expect("no edge could be long enough");
+    assert!(crossed.starts_with("size-min is 2, and size is 1: give a least edge length"), "{crossed}");
+    let defaults = RawSettings::default().check().expect("defaults");
+    let Settings { size_curvature, size_min, size_from, gradation, deviation, mesh_order, .. } = defaults;
+    assert_eq!(
+        (size_curvature, size_min, size_from, gradation, deviation, mesh_order),
+        (None, None, None, 0.4, None, 1)
+    );
+}
+
+#[test]
+fn labels_are_asked_for_or_ignored_and_who_says_one_unsays_the_other() {
+    let read = |text: &str| toml::from_str::<RawSettings>(text).expect("valid");
+    let labels = |said: RawSettings| said.check().map(|settings| settings.labels).map_err(|error| error.to_string());
+    let asked = LabelSource::Array("region".to_owned());
+    assert_eq!(labels(read("")), Ok(LabelSource::Usual));
+    assert_eq!(labels(read("ignore-labels = true")), Ok(LabelSource::Ignored));
+    assert_eq!(labels(read("label = \"region\"\nignore-labels = false")), Ok(asked.clone()));
+    let both = labels(read("label = \"region\"\nignore-labels = true")).expect_err("both");
+    assert!(both.starts_with("label and ignore-labels are both given"), "{both}");
+    let said = |flags: &str, file: &str| labels(read(flags).or(read(file)));
+    assert_eq!(said("label = \"region\"", "ignore-labels = true"), Ok(asked));
+    assert_eq!(said("ignore-labels = true", "label = \"region\""), Ok(LabelSource::Ignored));
+}
+
+/// What decides a result is told in its report, and comes back from there.
+#[test]
+fn settings_of_a_result_come_back_from_its_report() {
+    let text = "size-curvature = 30.0\nsize-min = 0.1\nsize-from = \"h\"\ngradation = 0.2\ndeviation = 0.5\nmesh-order = 2\n\
+                feature-angle = 50\nalso = [\"obj\"]\n";
+    for labels in ["", "label = \"region\"", "ignore-labels = true"] {
+        let said: RawSettings = toml::from_str(&format!("{text}{labels}")).expect("valid");
+        let settings = said.check().expect("in range");
+        let of_result = crate::report::ResultSettings::from(&settings);
+        let json = serde_json::to_string(&of_result).expect("JSON");
+        let read: crate::report::ResultSettings = serde_json::from_str(&json).expect("the same");
+        assert_eq!(read, of_result);
+        let defaults = RawSettings::default().check().expect("defaults");
+        assert_ne!(crate::report::ResultSettings::from(&defaults), of_result);
+        let again = read.applied_to(defaults);
+        assert_eq!((again.size_from.as_deref(), &again.labels), (Some("h"), &settings.labels));
+        assert_eq!(crate::report::ResultSettings::from(&again), of_result);
+    }
+}
+
+#[test]
+fn files_for_other_programs_are_there_once_and_can_be_unsaid() {
+    let read = |text: &str| toml::from_str::<RawSettings>(text);
+    let file = read("also = [\"welded\", \"obj\", \"welded\"]").expect("valid");
+    assert_eq!(file.clone().check().expect("in range").also, [Also::Obj, Also::Welded]);
+    let none = RawSettings { also: Some("none".parse().expect("a word")), ..RawSettings::default() };
+    assert_eq!(none.or(file).check().expect("in range").also, []);
+    assert_eq!(RawSettings::default().check().expect("defaults").also, []);
+    assert!(read("also = [\"stl\"]").is_err() && read("also = \"obj\"").is_err());
+}
+
 #[test]
 fn commands_are_said_in_the_file_and_checked_at_once() {
     let read = |text: &str| toml::from_str::<RawSettings>(text);

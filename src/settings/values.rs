@@ -27,6 +27,55 @@ pub enum ExportTarget {
     None,
 }
 
+/// A file for other programs, beside those of every result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Also {
+    /// surface.obj: the surface with texture coordinates.
+    Obj,
+    /// surface.glb: the same for what reads glTF.
+    Glb,
+    /// welded.vtu: the surface with one node where charts meet, for solvers.
+    Welded,
+}
+
+/// Which of these files are asked for: a list in planish.toml; on the command line words with commas between them, or `none`.
+///
+/// ```
+/// use planish::settings::{Also, AlsoFiles};
+///
+/// assert_eq!("welded,obj".parse(), Ok(AlsoFiles(vec![Also::Welded, Also::Obj])));
+/// assert_eq!("none".parse(), Ok(AlsoFiles(vec![])));
+/// assert_eq!("obj,fbx".parse::<AlsoFiles>(), Err("fbx is none of obj, glb and welded".to_owned()));
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(transparent)]
+pub struct AlsoFiles(pub Vec<Also>);
+
+impl AlsoFiles {
+    /// Each once, in their order, whatever that is in what was said.
+    pub(super) fn each_once(self) -> Vec<Also> {
+        let mut files = self.0;
+        files.sort_unstable();
+        files.dedup();
+        files
+    }
+}
+
+impl std::str::FromStr for AlsoFiles {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let file = |word: &str| match word {
+            "obj" => Ok(Also::Obj),
+            "glb" => Ok(Also::Glb),
+            "welded" => Ok(Also::Welded),
+            _ => Err(format!("{word} is none of obj, glb and welded")),
+        };
+        if text == "none" { Ok(Self::default()) } else { text.split(',').map(file).collect::<Result<_, _>>().map(Self) }
+    }
+}
+
 /// The boundary of charts in the plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
@@ -45,6 +94,18 @@ impl From<Boundary> for planish_core::BoundaryShape {
             Boundary::Circle => Self::Circle,
         }
     }
+}
+
+/// What names parts of a surface, the borders of which become seams.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub enum LabelSource {
+    /// What files of the format usually have: solids, groups, materials, physical groups, arrays of usual names.
+    #[default]
+    Usual,
+    /// An array, or another way to tell parts apart, by its name in the file.
+    Array(String),
+    /// Nothing.
+    Ignored,
 }
 
 /// The dihedral angle of feature edges.

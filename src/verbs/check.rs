@@ -14,7 +14,7 @@ use crate::output::ledger;
 use crate::report::{self, ChartReport, Output, Report, certificate, chart_checksum};
 use crate::result_files;
 use crate::settings::ExportTarget;
-use crate::stages::guard;
+use crate::stages::{self, guard};
 use planish_core::certify::{self, PlanarMap, prove};
 use planish_core::grid::GridPoint;
 use planish_core::measure::distortion::CellFields;
@@ -162,12 +162,16 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
 /// The files that a result with this report has.
 fn expected_files(report: &Report) -> Vec<&'static str> {
     let mut expected = REQUIRED.to_vec();
+    expected.extend(report.settings.also.iter().map(|also| stages::also_file(*also)));
     let is_asked_for = report.settings.hand_off == ExportTarget::Gmsh;
     let has_failed = report.hand_off.as_ref().is_some_and(|hand_off| hand_off.failure.is_some());
     if is_asked_for && !has_failed {
         expected.extend(HANDED_OFF);
         if report.hand_off.as_ref().is_some_and(|hand_off| hand_off.enlarged != 1.0) {
             expected.push(result_files::ENLARGED_MSH);
+        }
+        if report.hand_off.as_ref().is_some_and(|hand_off| hand_off.least_size.is_some()) {
+            expected.push(result_files::SIZES);
         }
     }
     expected

@@ -4,13 +4,15 @@
 //! What is found is told, and kept as mesh.json beside the report.
 
 use super::check::{folder, read_report};
+use super::finer;
 use super::{Exit, eprint_line, escape, say, say_json};
 use crate::cli;
 use crate::formats::gmsh;
 use crate::formats::vtu::{self, Shape};
-use crate::formats::{self, Kind, NoSiblings, Patches, READ, Source};
+use crate::formats::{self, Kind, Patches, READ, Source};
 use crate::input::read_file_into;
 use crate::outcome::Reason;
+use crate::report::mesh::DeviationReport;
 use crate::report::mesh::{MeshReport, PLACES};
 use crate::report::{Output, Report};
 use crate::result_files;
@@ -29,6 +31,10 @@ pub struct Question {
     pub size: Option<f64>,
     /// The least gamma of a fine element.
     pub min_gamma: f64,
+    /// How far mesh and surface may be from each other, where that is asked.
+    pub deviation: Option<f64>,
+    /// Whether to ask for shorter edges where it is more.
+    pub finer: bool,
     /// Whether to print JSON.
     pub json: bool,
 }
@@ -36,8 +42,8 @@ pub struct Question {
 impl Question {
     /// What is asked of a mesh, if one is given.
     pub fn of(asked: &cli::Check) -> Option<Self> {
-        let cli::Check { size, min_gamma, json, .. } = *asked;
-        Some(Self { mesh: asked.mesh.clone()?, size, min_gamma, json })
+        let cli::Check { size, min_gamma, deviation, finer, json, .. } = *asked;
+        Some(Self { mesh: asked.mesh.clone()?, size, min_gamma, deviation, finer, json })
     }
 }
 
@@ -72,6 +78,9 @@ pub fn check_mesh(
     }
     if !(0.0..=1.0).contains(&question.min_gamma) {
         return Err("--min-gamma must lie between 0 and 1".into());
+    }
+    if question.deviation.is_some_and(|d| !(d.is_finite() && d > 0.0)) {
+        return Err("--deviation must be a positive number: a distance in the unit of the input".into());
     }
     let name = escape(&question.mesh);
     let (folder, report) = match judge_guarded(result, question, settings) {
@@ -123,9 +132,14 @@ fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<Mesh
     let mesh_file = Output::of(&name, &bytes);
     let atlas = if patches.surfaces().is_some() { atlas(folder, &report, &mut bytes)? } else { None };
     drop(bytes);
-    let asked = soundness::Settings { size, min_gamma: question.min_gamma, off_surface: OFF_SURFACE };
+    let (min_gamma, deviation) = (question.min_gamma, question.deviation);
+    let asked = soundness::Settings { size, min_gamma, off_surface: OFF_SURFACE, deviation };
     let found = soundness::examine(&mesh(&patches), &surface, &charts, atlas.as_ref(), &asked);
-    Ok(MeshReport::new(mesh_file, surface_file, size, question.min_gamma, &found))
+    let mut judged = MeshReport::new(mesh_file, surface_file, size, min_gamma, &found);
+    if let (true, Some(deviation), Some(told)) = (question.finer, &found.deviation, &mut judged.deviation) {
+        told.held = finer::ask(folder, &report, &surface, deviation).map_err(Unjudged::Told)?;
+    }
+    Ok(judged)
 }
 
 /// The surface of a result, as it was published, and the chart of each triangle.
@@ -182,7 +196,7 @@ fn decode(path: &Path, bytes: &[u8], settings: &Settings) -> Result<Patches, Rea
         let message = format!("the file name tells no mesh; name one of {READ}");
         return Err(Reason::new(crate::outcome::Code::UnknownExtension, message));
     };
-    let source = Source { bytes, limits: &settings.limits, beside: &NoSiblings };
+    let source = Source::alone(bytes, &settings.limits);
     formats::read_patches(format, &source).map_err(|e| e.reason())
 }
 
@@ -241,6 +255,7 @@ fn text(name: &str, report: &MeshReport) -> String {
         report.mesh_to_surface.distance,
         report.surface_to_mesh.distance / report.size
     ));
+    lines.extend(report.deviation.iter().flat_map(deviation));
     let tips = match gamma.below_at_tips {
         0 => String::new(),
         n => format!(", and {n} in tips of the surface, which do not count"),
@@ -265,6 +280,20 @@ fn text(name: &str, report: &MeshReport) -> String {
         lines.extend(report.places.iter().map(|p| format!("   {} {}", located(Some(p.at)), p.what)));
     }
     lines.join("\n")
+}
+
+/// How far mesh and surface are from each other.
+fn deviation(found: &DeviationReport) -> Vec<String> {
+    let [to, from] = [found.mesh_to_surface, found.surface_to_mesh].map(|side| side.distance);
+    let mut lines = vec![format!(
+        "  deviation {to:.3e} from mesh to surface, {from:.3e} from surface to mesh; at {} elements more than {:.3e}",
+        found.elements, found.limit
+    )];
+    if let Some(first) = found.held.first() {
+        let at = located(Some(first.at));
+        lines.push(format!("  {} places need edges shorter than --size-min allows, the first{at}", found.held.len()));
+    }
+    lines
 }
 
 fn located(at: Option<[f64; 3]>) -> String {

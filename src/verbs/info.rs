@@ -9,6 +9,7 @@ use crate::report::RefusedComponent;
 use crate::report::{self, Counts, Repairs, Surface, Warning};
 use crate::settings::Settings;
 use crate::stages::{guard, refused, repaired};
+use crate::system::escape::printable;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -101,11 +102,22 @@ fn text(answer: &Answer, input: &Path) -> String {
         let [min, max] = surface.repaired.bbox;
         lines.push(format!("  area {:.6e}, box {min:?} to {max:?}", surface.repaired.area));
     }
+    lines.extend(answer.content.iter().filter(|notes| !notes.labels.is_empty()).map(labels));
     lines.extend(answer.refused_components.iter().map(refused_component));
     lines.extend(answer.repairs.iter().flat_map(repairs));
     lines.extend(answer.warnings.iter().map(|w| format!("  warning  {}", w.message)));
     lines.extend(answer.content.iter().flat_map(|notes| &notes.remarks).map(|remark| format!("  {remark}")));
     lines.join("\n")
+}
+
+/// Of many labels so many are listed.
+const LISTED: usize = 20;
+
+/// The names of the parts of the surface.
+fn labels(notes: &Notes) -> String {
+    let names = notes.labels.iter().take(LISTED).map(|label| printable(&label.name));
+    let more = if notes.labels.len() > LISTED { ", ..." } else { "" };
+    format!("  labels   {}: {}{more}", notes.labels.len(), names.collect::<Vec<_>>().join(", "))
 }
 
 fn refused_component(refused: &RefusedComponent) -> String {

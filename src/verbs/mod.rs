@@ -3,6 +3,7 @@
 pub mod check;
 pub mod check_config;
 pub mod check_mesh;
+mod finer;
 pub mod info;
 pub mod job;
 pub mod retry;

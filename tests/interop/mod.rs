@@ -4,9 +4,13 @@
 //! The Python environment is made beside the sources (`.venv`, not under version control) when a test first needs
 //! it, with the packages of requirements.txt.
 
+mod also;
 pub mod matrix;
+pub mod naming;
 pub mod recipe;
 pub mod remesh;
+mod sizes;
+pub mod sizing;
 
 use crate::support::{Out, fixture, root};
 use std::ffi::OsString;

@@ -49,10 +49,12 @@ def read_surface(path):
 def remesh(folder, seconds, keep):
     """Runs Gmsh on a copy of the hand-off; nodes, triangles with their surfaces, and edges along curves."""
     with tempfile.TemporaryDirectory() as scratch:
-        for name in ("atlas.msh", "atlas-enlarged.msh", "remesh.geo"):
+        for name in ("atlas.msh", "atlas-enlarged.msh", "sizes.pos", "remesh.geo"):
             if os.path.exists(os.path.join(folder, name)):
                 shutil.copy(os.path.join(folder, name), scratch)
         command = [sys.executable, os.path.join(os.path.dirname(sys.executable), "gmsh"), "remesh.geo", "-2"]
+        # Edges along seams are in no group, and looked at here all the same.
+        command.append("-save_all")
         done = subprocess.run(command, cwd=scratch, timeout=seconds, capture_output=True, text=True)
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.startswith(("Error", "Warning"))]
         assert done.returncode == 0, f"Gmsh ends with {done.returncode}: {said}"

@@ -7,7 +7,7 @@
 //! non-manifold edges measure nothing. All numbers are finite.
 
 use crate::mesh::SurfaceMesh;
-use crate::topology::VertexId;
+use crate::topology::{EdgeTable, HalfEdgeId, VertexFans, VertexId};
 use crate::vec3::{Vec3, cross, dot, norm, sub};
 
 /// Curvatures are cut off here, per diagonal of the bounding box: no mesher resolves radii below.
@@ -108,50 +108,70 @@ impl Star {
     }
 }
 
-/// The triangles of a surface, in the unit of its metric, by groups of vertices.
+/// The triangles of a surface, in the unit of its metric, with vertices that are numbered in some way.
 struct Faces<'a> {
-    mesh: &'a SurfaceMesh,
-    group: &'a [u32],
-    points: Vec<Vec3>,
+    triangles: &'a [[VertexId; 3]],
+    edges: &'a EdgeTable,
+    /// The corners of each triangle.
+    corners: Vec<[Vec3; 3]>,
     normals: Vec<Vec3>,
     areas: Vec<f64>,
 }
 
 impl<'a> Faces<'a> {
-    fn new(mesh: &'a SurfaceMesh, group: &'a [u32]) -> Self {
+    /// The triangles of `mesh`, whose vertices are numbered as in `triangles`, and whose edges are `edges`.
+    fn new(mesh: &SurfaceMesh, triangles: &'a [[VertexId; 3]], edges: &'a EdgeTable) -> Self {
         let scale = mesh.metric().scale;
-        let points: Vec<Vec3> = mesh.points().iter().map(|p| p.map(|c| c * scale)).collect();
-        let normals = mesh.triangles().iter().map(|t| unit_normal(t.map(|v| points[v.index()]))).collect();
+        let scaled = |face: usize| mesh.corners(face).map(|p| p.map(|c| c * scale));
+        let corners: Vec<[Vec3; 3]> = (0..triangles.len()).map(scaled).collect();
+        let normals = corners.iter().map(|p| unit_normal(*p)).collect();
         let areas = mesh.metric().shapes.iter().map(|s| s.area()).collect();
-        Self { mesh, group, points, normals, areas }
+        Self { triangles, edges, corners, normals, areas }
     }
 
-    fn group_of(&self, v: VertexId) -> usize {
-        self.group[v.index()] as usize
-    }
-
-    /// Per group, the measure and the area of its cell: half of each edge, a third of each triangle.
-    fn cells(&self, groups: usize) -> Vec<Measure> {
-        let triangles = self.mesh.triangles();
-        let mut cells = vec![Measure::default(); groups];
-        for (t, area) in triangles.iter().zip(&self.areas) {
+    /// Per vertex, the measure and the area of its cell: half of each edge, a third of each triangle.
+    fn cells(&self, vertices: usize) -> Vec<Measure> {
+        let mut cells = vec![Measure::default(); vertices];
+        for (t, area) in self.triangles.iter().zip(&self.areas) {
             for v in t {
-                cells[self.group_of(*v)].area += area / 3.0;
+                cells[v.index()].area += area / 3.0;
             }
         }
-        for (_, sides) in self.mesh.edges().iter() {
+        for (_, sides) in self.edges.iter() {
             // Only edges between two triangles have a dihedral angle.
             let [g, h] = *sides else { continue };
-            let t = triangles[g.face().index()];
+            let t = self.triangles[g.face().index()];
             let ends = [t[g.side()], t[(g.side() + 1) % 3]];
-            let along = sub(self.points[ends[1].index()], self.points[ends[0].index()]);
+            let corners = self.corners[g.face().index()];
+            let along = sub(corners[(g.side() + 1) % 3], corners[g.side()]);
             let [left, right] = [g, h].map(|h| self.normals[h.face().index()]);
             let half = edge_measure(along, left, right).map(|x| 0.5 * x);
             for v in ends {
-                cells[self.group_of(v)].add(half, 0.0);
+                cells[v.index()].add(half, 0.0);
             }
         }
         cells
+    }
+
+    /// The curvature at every vertex: the measure of the cells of its star.
+    fn curvatures(&self, vertices: usize) -> Vec<Curvature> {
+        let cells = self.cells(vertices);
+        let mut stars = vec![Star::default(); vertices];
+        for (face, corners) in self.triangles.iter().enumerate() {
+            // The cells of the triangle's corners, added to the star of each of them.
+            let mut around = Measure::default();
+            for c in corners {
+                around.add(cells[c.index()].tensor, cells[c.index()].area);
+            }
+            for c in corners {
+                let star = &mut stars[c.index()];
+                star.measure.add(around.tensor, around.area);
+                for k in 0..3 {
+                    star.normal[k] += self.areas[face] * self.normals[face][k];
+                }
+            }
+        }
+        stars.into_iter().map(Star::curvature).collect()
     }
 }
 
@@ -183,25 +203,43 @@ impl<'a> Faces<'a> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn measure(mesh: &SurfaceMesh, group: &[u32], groups: usize) -> Vec<Curvature> {
-    let faces = Faces::new(mesh, group);
-    let cells = faces.cells(groups);
-    let mut stars = vec![Star::default(); groups];
-    for (face, t) in mesh.triangles().iter().enumerate() {
-        let corners = t.map(|v| faces.group_of(v));
-        // The cells of the triangle's corners, added to the star of each of them.
-        let mut around = Measure::default();
-        for c in corners {
-            around.add(cells[c].tensor, cells[c].area);
-        }
-        for c in corners {
-            let star = &mut stars[c];
-            star.measure.add(around.tensor, around.area);
-            for k in 0..3 {
-                star.normal[k] += faces.areas[face] * faces.normals[face][k];
-            }
+    let grouped: Vec<[VertexId; 3]> = mesh.triangles().iter().map(|t| t.map(|v| VertexId(group[v.index()]))).collect();
+    Faces::new(mesh, &grouped, mesh.edges()).curvatures(groups)
+}
+
+/// The largest curvature at each vertex of `mesh`, by magnitude, in the inverse unit of the input, where the surface is smooth:
+/// creases part it, and the sides of one have curvatures of their own, the larger of which counts. Sheets and labels that meet
+/// in two triangles along an edge do not part it. `is_crease` tells creases by their half-edges.
+///
+/// ```
+/// use planish_core::measure::curvature::largest;
+/// use planish_core::{repair, shapes};
+///
+/// // A square duct has flat sides, and four edges that bend by 90 degrees.
+/// let mesh = repair(&shapes::tube(4, 6, 3.0), &repair::Settings::default())?.mesh;
+/// assert!(largest(&mesh, |_, _| true).iter().all(|k| *k == 0.0));
+/// assert!(largest(&mesh, |_, _| false).iter().any(|k| *k > 1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn largest(mesh: &SurfaceMesh, is_crease: impl Fn(HalfEdgeId, HalfEdgeId) -> bool) -> Vec<f64> {
+    let welded: Vec<[VertexId; 3]> =
+        mesh.triangles().iter().map(|t| t.map(|v| VertexId(mesh.welded_vertex(v)))).collect();
+    let edges = EdgeTable::new(&welded);
+    let joins = |sides: &[HalfEdgeId]| matches!(*sides, [g, h] if !is_crease(g, h));
+    let fans = VertexFans::across(&welded, &edges, joins);
+    // Every smooth part of a star is a vertex of its own: edges between such are open.
+    let corner = |face: usize| [0, 1, 2].map(|k| VertexId(fans.of_corner[3 * face + k]));
+    let parted: Vec<[VertexId; 3]> = (0..welded.len()).map(corner).collect();
+    let edges = EdgeTable::new(&parted);
+    let curvatures = Faces::new(mesh, &parted, &edges).curvatures(fans.count);
+    let mut of_welded = vec![0.0_f64; mesh.welded().iter().max().map_or(0, |last| *last as usize + 1)];
+    for (triangle, corners) in welded.iter().zip(&parted) {
+        for (v, fan) in triangle.iter().zip(corners) {
+            let [first, _] = curvatures[fan.index()].principal(mesh.metric().scale);
+            of_welded[v.index()] = of_welded[v.index()].max(norm(first));
         }
     }
-    stars.into_iter().map(Star::curvature).collect()
+    mesh.welded().iter().map(|w| of_welded[*w as usize]).collect()
 }
 
 /// b l t t^T for an edge between triangles with the given normals.

@@ -4,4 +4,5 @@ pub mod curvature;
 pub mod distortion;
 pub(crate) mod quantiles;
 pub mod scale;
+pub mod sizes;
 pub mod spikes;

@@ -1,6 +1,6 @@
 //! Halving edges of a surface, and the triangles at them with them.
 
-use super::{SurfaceMesh, TriangleShape};
+use super::{SurfaceMesh, TriangleShape, push_mean};
 use crate::topology::{EdgeId, EdgeTable, FaceId, HalfEdgeId, VertexId};
 use crate::vec3::midpoint;
 
@@ -103,6 +103,7 @@ pub(crate) fn halve(mut mesh: SurfaceMesh, groups: &[Vec<EdgeId>]) -> Halved {
             mesh.summary.inconsistent_edges += usize::from(sides[1..].iter().any(|h| begin(*h) == from));
             middles[edge.index()] = VertexId::at(mesh.points.len());
             mesh.points.push(midpoint(mesh.points[from.index()], mesh.points[to.index()]));
+            push_mean(&mut mesh.sizes, [from, to]);
             mesh.welded.push(welded);
             ends.push([from, to]);
             faces.extend(sides.iter().map(|h| h.face()));

@@ -1,6 +1,6 @@
 //! Editing a surface: the only place where triangles of a [`SurfaceMesh`] change, and what it knows of itself with them.
 
-use super::{SurfaceMesh, TriangleShape};
+use super::{SurfaceMesh, TriangleShape, push_mean};
 use crate::topology::{EdgeTable, FaceId, HalfEdgeId, VertexId};
 use crate::vec3::midpoint;
 
@@ -48,6 +48,7 @@ impl MeshEditor {
         if parts.iter().flatten().any(|(_, shape)| shape.area() == 0.0) {
             return None;
         }
+        push_mean(&mut self.mesh.sizes, ends[0]);
         let [p, q] = ends[0].map(|v| self.mesh.points[v.index()]);
         self.mesh.points.push(midpoint(p, q));
         self.mesh.welded.push(self.next_welded);

@@ -3,6 +3,7 @@
 mod bisect;
 mod edit;
 mod intrinsic;
+mod labels;
 mod outlier;
 mod soup;
 mod steps;
@@ -16,4 +17,4 @@ pub use soup::{SoupError, TriangleSoup};
 pub use steps::{CoordinateSteps, FEW_STEPS};
 pub(crate) use surface::Patch;
 pub use surface::SurfaceMesh;
-pub(crate) use surface::{Sheets, SurfaceParts};
+pub(crate) use surface::{Sheets, SurfaceParts, push_mean};

@@ -4,6 +4,7 @@
 //! refuses nothing, and stands somewhere else instead, see [`TriangleSoup::new`].
 
 use crate::vec3::Vec3;
+use std::sync::Arc;
 
 /// Coordinates beyond this are refused: their squares would overflow.
 const LARGEST: f64 = 1e100;
@@ -13,6 +14,8 @@ const LARGEST: f64 = 1e100;
 pub struct TriangleSoup {
     points: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
+    labels: Arc<[u32]>,
+    sizes: Vec<f64>,
 }
 
 /// Why points and triangles are no soup.
@@ -113,7 +116,74 @@ impl TriangleSoup {
             refuse_corners(&points, &triangles)?;
             move_unsound(&mut points);
         }
-        Ok(Self { points, triangles })
+        Ok(Self { points, triangles, labels: Arc::default(), sizes: Vec::new() })
+    }
+
+    /// The same soup, each triangle with a label, whatever that means to the caller. No chart crosses the border between two
+    /// labels: it becomes a seam.
+    ///
+    /// ```
+    /// use planish_core::monitor::NoMonitor;
+    /// use planish_core::{Settings, parametrize, shapes};
+    ///
+    /// // A disk whose left half has another name than its right one.
+    /// let soup = shapes::flat_disk(4);
+    /// let middle = |t: &[u32; 3]| t.iter().map(|v| soup.points()[*v as usize][0]).sum::<f64>();
+    /// let labels = soup.triangles().iter().map(|t| u32::from(middle(t) > 0.0)).collect();
+    /// let atlas = parametrize(&soup.clone().with_labels(labels), &Settings::default(), &NoMonitor)?;
+    /// assert_eq!(atlas.charts().len(), 2);
+    /// assert_ne!(atlas.label(atlas.charts()[0].id()), atlas.label(atlas.charts()[1].id()));
+    /// # Ok::<(), planish_core::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If there is not one label for every triangle.
+    pub fn with_labels(self, labels: Vec<u32>) -> Self {
+        assert_eq!(labels.len(), self.triangles.len(), "a label for every triangle");
+        Self { labels: labels.into(), ..self }
+    }
+
+    /// The labels of the triangles; none at all where they have none.
+    pub fn labels(&self) -> &Arc<[u32]> {
+        &self.labels
+    }
+
+    /// The same soup, each point with the length of edges that a mesh shall have there, in the unit of the coordinates. What is
+    /// no length ([`Self::is_size`]) asks for nothing. Surfaces tell it by [`SurfaceMesh::given_size`].
+    ///
+    /// ```
+    /// use planish_core::topology::VertexId;
+    /// use planish_core::{repair, shapes};
+    ///
+    /// let soup = shapes::flat_disk(4);
+    /// let sizes = soup.points().iter().map(|[x, ..]| 0.1 * x).collect();
+    /// let mesh = repair(&soup.with_sizes(sizes), &repair::Settings::default())?.mesh;
+    /// for (v, [x, ..]) in mesh.points().iter().enumerate() {
+    ///     assert_eq!(mesh.given_size(VertexId::at(v)), (*x > 0.0).then_some(0.1 * x));
+    /// }
+    /// # Ok::<(), repair::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If there is not one size for every point.
+    ///
+    /// [`SurfaceMesh::given_size`]: super::SurfaceMesh::given_size
+    pub fn with_sizes(self, mut sizes: Vec<f64>) -> Self {
+        assert_eq!(sizes.len(), self.points.len(), "a size for every point");
+        for size in sizes.iter_mut().filter(|size| !Self::is_size(**size)) {
+            *size = f64::INFINITY;
+        }
+        Self { sizes, ..self }
+    }
+
+    /// Whether a number is a length of edges: it is finite and positive, and none of those so small that they lose digits.
+    pub fn is_size(size: f64) -> bool {
+        size.is_normal() && size > 0.0
+    }
+
+    /// The sizes at the points, infinite where nothing is asked for; none at all where they have none.
+    pub fn sizes(&self) -> &[f64] {
+        &self.sizes
     }
 
     /// Whether a point may be the corner of a triangle: its coordinates are numbers that are not too large.

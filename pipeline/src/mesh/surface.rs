@@ -3,6 +3,7 @@
 use super::Metric;
 use crate::topology::{EdgeTable, FaceId, TopologySummary, VertexId};
 use crate::vec3::{BoundingBox, Vec3, triangle_area};
+use std::sync::Arc;
 
 /// A mesh gets at least this many edges along the diagonal of the bounding box, unless another size is asked for: CAD parts
 /// of a dozen facets would keep theirs otherwise.
@@ -30,6 +31,10 @@ pub struct SurfaceMesh {
     pub(super) points: Vec<Vec3>,
     pub(super) triangles: Vec<[VertexId; 3]>,
     pub(super) source: Vec<u32>,
+    /// Per triangle of the input, its label; empty where there are none.
+    pub(super) labels: Arc<[u32]>,
+    /// Per vertex, the size that is asked for there, infinite for none; empty where there are none.
+    pub(super) sizes: Vec<f64>,
     pub(super) welded: Vec<u32>,
     /// Vertices from this one on are not of the input.
     pub(super) added_from: usize,
@@ -45,6 +50,8 @@ pub(crate) struct SurfaceParts {
     pub points: Vec<Vec3>,
     pub triangles: Vec<[VertexId; 3]>,
     pub source: Vec<u32>,
+    pub labels: Arc<[u32]>,
+    pub sizes: Vec<f64>,
     pub welded: Vec<u32>,
     pub added_from: usize,
     pub edges: EdgeTable,
@@ -76,14 +83,22 @@ pub(crate) struct Patch {
     pub mollified_by: f64,
 }
 
+/// Adds the size in the middle between two vertices, where there are sizes.
+pub(crate) fn push_mean(sizes: &mut Vec<f64>, ends: [VertexId; 2]) {
+    if !sizes.is_empty() {
+        let [a, b] = ends.map(|v| sizes[v.index()]);
+        sizes.push(0.5 * a + 0.5 * b);
+    }
+}
+
 impl SurfaceMesh {
     /// A surface of these parts, counted, unless its triangles are `counted` already.
     pub(crate) fn new(parts: SurfaceParts, sheets: Sheets, counted: Option<TopologySummary>) -> Self {
-        let SurfaceParts { points, triangles, source, welded, added_from, edges, metric } = parts;
+        let SurfaceParts { points, triangles, source, labels, sizes, welded, added_from, edges, metric } = parts;
         let counted = counted.unwrap_or_else(|| TopologySummary::new(&triangles, &edges));
         let Sheets { nonmanifold_edges, nonmanifold_vertices } = sheets;
         let summary = TopologySummary { nonmanifold_edges, nonmanifold_vertices, ..counted };
-        Self { points, triangles, source, welded, added_from, by_refinement: 0, edges, summary, metric }
+        Self { points, triangles, source, labels, sizes, welded, added_from, by_refinement: 0, edges, summary, metric }
     }
 
     /// Checks what the surface knows of itself against what its triangles tell.
@@ -101,6 +116,7 @@ impl SurfaceMesh {
         let faces = self.triangles.len();
         assert_eq!((self.source.len(), self.metric.shapes.len(), self.metric.flagged.len()), (faces, faces, faces));
         assert_eq!((self.welded.len(), self.summary.vertices), (self.points.len(), self.points.len()));
+        assert!(self.sizes.is_empty() || self.sizes.len() == self.points.len(), "sizes");
     }
 
     /// The positions of the vertices, in the unit of the input.
@@ -118,6 +134,11 @@ impl SurfaceMesh {
         self.source[face]
     }
 
+    /// The label of triangle `face`; none where the input has no labels.
+    pub fn label(&self, face: usize) -> Option<u32> {
+        self.labels.get(self.source[face] as usize).copied()
+    }
+
     /// The welded vertex that `vertex` is a copy of: vertices of the input, bit-equal ones merged, in the
     /// order of their first appearance.
     pub fn welded_vertex(&self, vertex: VertexId) -> u32 {
@@ -127,6 +148,12 @@ impl SurfaceMesh {
     /// The welded vertex, unless `vertex` was added: then it has a number there that no vertex of the input has.
     pub fn input_vertex(&self, vertex: VertexId) -> Option<u32> {
         (vertex.index() < self.added_from).then(|| self.welded[vertex.index()])
+    }
+
+    /// The length of edges that the input asks for at `vertex` ([`crate::mesh::TriangleSoup::with_sizes`]): of points that became
+    /// one, the least; at a vertex that was added in the middle of an edge, the mean of its ends. None where it asks for nothing.
+    pub fn given_size(&self, vertex: VertexId) -> Option<f64> {
+        self.sizes.get(vertex.index()).copied().filter(|size| size.is_finite())
     }
 
     /// The edges.
@@ -189,14 +216,17 @@ impl SurfaceMesh {
             mollified_by: self.metric.mollified_by,
             scale: self.metric.scale,
         };
-        Self::of_patch(triangles, self.edges.part(faces, local), metric, self.patch(&vertices, faces))
+        let part = Self::of_patch(triangles, self.edges.part(faces, local), metric, self.patch(&vertices, faces));
+        let sizes = vertices.iter().filter_map(|v| self.sizes.get(v.index()).copied()).collect();
+        Self { labels: self.labels.clone(), sizes, ..part }
     }
 
     /// A part as a surface of its own.
     pub(crate) fn of_patch(triangles: Vec<[VertexId; 3]>, edges: EdgeTable, metric: Metric, patch: Patch) -> Self {
         let Patch { points, welded, source, added_from, .. } = patch;
         let summary = TopologySummary::new(&triangles, &edges);
-        Self { points, triangles, source, welded, added_from, by_refinement: 0, edges, summary, metric }
+        let (labels, sizes) = (Arc::default(), Vec::new());
+        Self { points, triangles, source, labels, sizes, welded, added_from, by_refinement: 0, edges, summary, metric }
     }
 
     /// The total true area, in the unit of the input, squared.
@@ -212,9 +242,18 @@ impl SurfaceMesh {
         Self { by_refinement: triangles, ..self }
     }
 
-    /// The length of edges of a mesh like this one, in the unit of the input: that of as many equilateral triangles of the
-    /// same area, but at most a fiftieth of the diagonal of the bounding box. What refinement added does not count.
+    /// The largest of the lengths of edges that the input asks for; none where it asks for none.
+    fn largest_given_size(&self) -> Option<f64> {
+        self.sizes.iter().copied().filter(|size| size.is_finite()).reduce(f64::max)
+    }
+
+    /// The length of edges of a mesh of this surface, in the unit of the input: the largest that the input asks for. Where it asks
+    /// for none, that of as many equilateral triangles of the same area, but at most a fiftieth of the diagonal of the bounding
+    /// box. What refinement added does not count.
     pub fn default_size(&self) -> f64 {
+        if let Some(largest) = self.largest_given_size() {
+            return largest;
+        }
         let coarsest = self.bounding_box().diagonal() / EDGES_PER_DIAGONAL;
         let share = self.area() / (self.triangles.len() - self.by_refinement) as f64;
         let edge = (share * 4.0 / 3.0_f64.sqrt()).sqrt();
@@ -225,5 +264,71 @@ impl SurfaceMesh {
     pub fn bounding_box(&self) -> BoundingBox {
         let origin = BoundingBox { min: [0.0; 3], max: [0.0; 3] };
         BoundingBox::of(self.points.iter().copied()).unwrap_or(origin)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriangleSoup;
+    use crate::mesh::bisect::halve;
+    use crate::mesh::edit::MeshEditor;
+    use crate::topology::{EdgeId, HalfEdgeId};
+    use crate::{repair, shapes};
+
+    /// A size that is linear in space, so that means in the middle of edges are its values there.
+    fn linear([x, y, z]: Vec3) -> f64 {
+        10.0 + x + 2.0 * y + 3.0 * z
+    }
+
+    fn sized(soup: &TriangleSoup) -> TriangleSoup {
+        soup.clone().with_sizes(soup.points().iter().map(|p| linear(*p)).collect())
+    }
+
+    fn assert_linear(mesh: &SurfaceMesh) {
+        assert_eq!(mesh.sizes.len(), mesh.points.len());
+        for (v, point) in mesh.points().iter().enumerate() {
+            let (given, expected) = (mesh.given_size(VertexId::at(v)).expect("a size"), linear(*point));
+            // Where cracks are closed, points move by less than a millionth.
+            assert!((given - expected).abs() <= 1e-6 * expected, "{given} for {expected} at {point:?}");
+        }
+    }
+
+    /// Whatever becomes of vertices: sheets, borders of labels, parts, halved edges.
+    #[test]
+    fn sizes_follow_the_vertices() {
+        for soup in [shapes::book(3, 4), shapes::cracked_patch(), shapes::sphere(5), shapes::bow_tie()] {
+            let mesh = repair(&sized(&soup), &Default::default()).expect("a surface").mesh;
+            assert_linear(&mesh);
+            let labels = (0..soup.triangles().len() as u32).map(|t| t % 3).collect();
+            let labelled = repair(&sized(&soup).with_labels(labels), &Default::default()).expect("a surface").mesh;
+            assert_linear(&labelled.cut_between_labels());
+            let inner = mesh.edges().iter().find_map(|(_, sides)| <[HalfEdgeId; 2]>::try_from(sides).ok());
+            let mut editor = MeshEditor::new(mesh.clone());
+            if let Some(edge) = inner {
+                editor.split_edge(edge).expect("parts with area");
+            }
+            assert_linear(&editor.finish());
+            let half: Vec<Vec<EdgeId>> = mesh.edges().iter().step_by(2).map(|(edge, _)| vec![edge]).collect();
+            assert_linear(&halve(mesh.clone(), &half).mesh);
+            let all: Vec<FaceId> = (0..mesh.triangles().len()).map(FaceId::at).collect();
+            assert_linear(&mesh.restricted(&all));
+        }
+    }
+
+    /// Points that no triangle uses do not count, and what is asked for nowhere is none.
+    #[test]
+    fn points_that_are_merged_have_the_least_of_their_sizes() {
+        let points = vec![[0.0; 3], [9.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.0; 3], [0.0, -1.0, 0.0]];
+        let soup = TriangleSoup::new(points, vec![[0, 2, 3], [4, 5, 2]]).expect("a soup");
+        let given = |sizes: [f64; 6]| {
+            let mesh = repair(&soup.clone().with_sizes(sizes.to_vec()), &Default::default()).expect("a surface").mesh;
+            ([0, 1, 2, 3].map(|v| mesh.given_size(VertexId(v))), mesh.default_size())
+        };
+        let (found, largest) = given([0.5, 99.0, 2.0, 3.0, 0.25, f64::NAN]);
+        assert_eq!((found, largest), ([Some(0.25), Some(2.0), Some(3.0), None], 3.0));
+        let (found, usual) = given([-1.0, 99.0, 0.0, f64::INFINITY, 5e-324, f64::NAN]);
+        let without = repair(&soup, &Default::default()).expect("a surface").mesh;
+        assert_eq!((found, usual), ([None; 4], without.default_size()));
     }
 }

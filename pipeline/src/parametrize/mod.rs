@@ -109,7 +109,8 @@ impl From<ChartError> for Error {
 /// order, at the same time, and elsewhere.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The surface. Where ears of charts were split (see [`split_ears`]), it has more triangles than the one that was given.
+    /// The surface, cut open between labels ([`TriangleSoup::with_labels`]). Where ears of charts were split (see
+    /// [`split_ears`]), it has more triangles than the one that was given.
     pub mesh: SurfaceMesh,
     /// A job for every chart.
     pub jobs: Vec<ChartJob>,
@@ -126,6 +127,7 @@ impl Plan {
     /// [`Error::Setting`], [`Error::Illegal`], [`Error::Interrupted`].
     pub fn new(mesh: SurfaceMesh, settings: &Settings, monitor: &dyn Monitor) -> Result<Self, Error> {
         settings.check()?;
+        let mesh = mesh.cut_between_labels();
         let atlas = decompose(&mesh, &settings.decompose, monitor)?;
         let without_ears = split_ears(&mesh, &atlas, settings.decompose.max_triangles)?;
         let (mesh, atlas, ears_split) = match without_ears {

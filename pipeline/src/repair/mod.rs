@@ -22,12 +22,13 @@ mod slivers;
 mod t_junctions;
 pub(crate) mod weld;
 
-use crate::mesh::{Metric, Sheets, SurfaceMesh, SurfaceParts, TriangleSoup};
+use crate::mesh::{Metric, Sheets, SurfaceMesh, SurfaceParts, TriangleSoup, push_mean};
 use crate::topology::{EdgeTable, TopologySummary, VertexFans};
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 use crate::vec3::{BoundingBox, Vec3, midpoint, unit_scale};
 pub use sheets::{Accepted, RefusedComponent};
 use sheets::{MAX_SHEETS, MAX_TINY_SHEETS, TINY_SHEET};
+use std::sync::Arc;
 use t_junctions::Boundary;
 
 /// What repair may do.
@@ -182,6 +183,10 @@ struct MeshBuilder {
     points: Vec<Vec3>,
     triangles: Vec<[VertexId; 3]>,
     source: Vec<u32>,
+    /// Per triangle of the input, its label; empty where there are none.
+    labels: Arc<[u32]>,
+    /// Per point, the size that is asked for there, infinite for none; empty where there are none.
+    sizes: Vec<f64>,
 }
 
 /// The points of a builder in a unit in which distances neither overflow nor underflow, and the tolerance in that unit.
@@ -264,6 +269,11 @@ fn renewed(edges: EdgeTable, changed: bool, triangles: &[[VertexId; 3]]) -> Edge
 }
 
 impl MeshBuilder {
+    /// The label of a triangle; none where there are no labels.
+    fn label(&self, face: usize) -> Option<u32> {
+        self.labels.get(self.source[face] as usize).copied()
+    }
+
     /// The number of points that triangles use.
     fn count_used(&self) -> usize {
         let mut used = vec![false; self.points.len()];
@@ -348,6 +358,7 @@ impl MeshBuilder {
             let [a, b] = [t[sides[0].side()], t[(sides[0].side() + 1) % 3]];
             let middle = VertexId::at(self.points.len());
             self.points.push(midpoint(self.points[a.index()], self.points[b.index()]));
+            push_mean(&mut self.sizes, [a, b]);
             cut.extend(sides.iter().map(|h| (*h, middle)));
             opened += 1;
         }
@@ -380,6 +391,7 @@ impl MeshBuilder {
         report.cracks_closed = closed.pairs;
         if closed.pairs > 0 {
             self.triangles.iter_mut().for_each(|t| *t = t.map(|v| closed.target[v.index()]));
+            self.sizes = weld::least(&self.sizes, &closed.target, self.sizes.len());
         } else if report.t_junctions_closed.count == 0 {
             return;
         }
@@ -439,7 +451,9 @@ impl MeshBuilder {
         let nonmanifold_vertices = pinned_vertices(&welded, &triangles, &edges);
         let counted = known.filter(|_| report.split_vertices.count == 0).cloned();
         let added_from = welded.partition_point(|w| (*w as usize) < input_points);
-        let parts = SurfaceParts { points, triangles, source: self.source, welded, added_from, edges, metric };
+        let sizes = welded.iter().filter_map(|w| self.sizes.get(*w as usize).copied()).collect();
+        let (source, labels) = (self.source, self.labels);
+        let parts = SurfaceParts { points, triangles, source, labels, sizes, welded, added_from, edges, metric };
         SurfaceMesh::new(parts, Sheets { nonmanifold_edges, nonmanifold_vertices }, counted)
     }
 }

@@ -3,7 +3,7 @@
 //! *Needles* have an edge below the tolerance: it is collapsed, one end moves to the other. *Caps* have none, and a corner that
 //! lies on the edge across, within the tolerance: that edge is flipped, so that it runs through the corner. Both only where the
 //! surface stays what it is: the link condition holds (Dey, Edelsbrunner, Guha and Nekhayev 1999, *Topology preserving edge
-//! contraction*), no triangle turns over, no open edge and no edge of three or more triangles moves, and nothing moves farther
+//! contraction*), no triangle turns over, no open edge, no edge of three or more triangles and no border between labels moves, and nothing moves farther
 //! than the tolerance, all steps together. What is left is mollified, as before.
 //!
 //! *It ends.* A collapse leaves fewer triangles; a flip leaves as many, and replaces an edge by a shorter one.
@@ -115,7 +115,7 @@ struct Work<'a> {
     measure: &'a Measure,
     /// Per vertex, the triangles at it.
     stars: Vec<Vec<usize>>,
-    /// Per vertex, whether all edges at it have two sides that run in opposite directions.
+    /// Per vertex, whether all edges at it have two sides that run in opposite directions, with triangles of one label.
     is_inside: Vec<bool>,
     /// Per triangle, whether it is there still.
     is_kept: Vec<bool>,
@@ -135,7 +135,8 @@ impl<'a> Work<'a> {
         for (_, sides) in edges.iter() {
             let ends = |i: usize| [sides[i], sides[i].next()].map(|h| builder.triangles[h.face().index()][h.side()]);
             let is_manifold = sides.len() == 2 && ends(0)[0] == ends(1)[1] && ends(0)[1] == ends(1)[0];
-            if !is_manifold {
+            let is_border = || builder.label(sides[0].face().index()) != builder.label(sides[1].face().index());
+            if !is_manifold || is_border() {
                 ends(0).iter().for_each(|v| is_inside[v.index()] = false);
             }
         }
@@ -202,6 +203,10 @@ impl<'a> Work<'a> {
     fn flip_of(&self, face: usize, longest: usize) -> Option<Step> {
         let shapes = self.shapes();
         let (beyond, side) = self.beyond(face, longest)?;
+        // The parts of the triangle beyond would have its label: that of the sliver would lose its area.
+        if self.builder.label(face) != self.builder.label(beyond) {
+            return None;
+        }
         let [p, q, r] = [0, 1, 2].map(|k| self.builder.triangles[face][(longest + k) % 3]);
         let s = self.builder.triangles[beyond][(side + 2) % 3];
         let length = distance(shapes.at(p), shapes.at(q));

@@ -19,7 +19,18 @@ pub(super) fn weld(soup: &TriangleSoup) -> (MeshBuilder, usize) {
     let merged = number.len() - points.len();
     let triangles: Vec<_> = soup.triangles().iter().map(|t| t.map(|i| number[i as usize])).collect();
     let source = (0..triangles.len() as u32).collect();
-    (MeshBuilder { points, triangles, source }, merged)
+    let sizes = least(soup.sizes(), &number, points.len());
+    (MeshBuilder { points, triangles, source, labels: soup.labels().clone(), sizes }, merged)
+}
+
+/// The least of the sizes at points that became one, by the numbers of these; none where there are none.
+pub(super) fn least(sizes: &[f64], number: &[VertexId], count: usize) -> Vec<f64> {
+    let mut of_merged = vec![f64::INFINITY; if sizes.is_empty() { 0 } else { count }];
+    for (size, vertex) in sizes.iter().zip(number) {
+        let least = &mut of_merged[vertex.index()];
+        *least = least.min(*size);
+    }
+    of_merged
 }
 
 /// Per point the number of the one that stands for all with equal coordinates (0 and -0 are equal), and these, in the order

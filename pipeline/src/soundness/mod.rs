@@ -16,6 +16,7 @@
 
 mod covering;
 mod curves;
+mod deviation;
 mod distance;
 mod elements;
 mod intersect;
@@ -23,6 +24,7 @@ mod open;
 mod reference;
 mod topology;
 
+pub use deviation::{BARELY, Deviation, TooFar};
 pub use distance::Farthest;
 pub use elements::{EdgeLengths, gamma};
 pub use reference::{HandedOverAtlas, HandedOverChart, Mesh, Triangulation};
@@ -63,6 +65,8 @@ pub struct Settings {
     pub min_gamma: f64,
     /// How far nodes may be off the surface, relative to the diagonal of its bounding box. Single precision needs 1e-6.
     pub off_surface: f64,
+    /// How far mesh and surface may be from each other anywhere, in the unit of the surface; none: that is not looked at.
+    pub deviation: Option<f64>,
 }
 
 /// Why a mesh does not represent the surface.
@@ -196,6 +200,20 @@ pub enum Defect {
         /// The point there.
         at: Vec3,
     },
+    /// Elements at which mesh and surface are too far apart.
+    #[error(
+        "mesh and surface are up to {distance:.3e} apart, at {elements} elements by more than the deviation {limit:.3e}"
+    )]
+    Deviates {
+        /// How many elements.
+        elements: usize,
+        /// The largest distance.
+        distance: f64,
+        /// The largest one allowed.
+        limit: f64,
+        /// The element there.
+        at: Vec3,
+    },
     /// Another area.
     #[error("the area is {ratio:.4} times that of the surface (allowed: {low} to {high}): parts are lost or doubled")]
     Area {
@@ -262,6 +280,7 @@ impl Defect {
             | Self::BoundaryNested { at, .. }
             | Self::OffSurface { at, .. }
             | Self::Lost { at, .. }
+            | Self::Deviates { at, .. }
             | Self::Crossing { at, .. }
             | Self::Inverted { at, .. }
             | Self::Degenerate { at, .. } => Some(*at).filter(|at| at.iter().all(|c| c.is_finite())),
@@ -297,6 +316,8 @@ pub struct Findings {
     pub mesh_to_surface: Farthest,
     /// The largest distance of a point of the surface to the mesh.
     pub surface_to_mesh: Farthest,
+    /// How far both are from each other everywhere, where that was asked for.
+    pub deviation: Option<Deviation>,
     /// Pairs of triangles that cross where those of the surface cross or touch.
     pub crossings_of_surface: usize,
     /// The least gamma.
@@ -336,7 +357,7 @@ impl Findings {
 /// let soup = shapes::disk(8);
 /// let surface = Triangulation::welded(soup.points(), soup.triangles().iter().copied());
 /// let (charts, mids) = (vec![0; surface.triangles.len()], vec![None; surface.triangles.len()]);
-/// let settings = Settings { size: 0.15, min_gamma: 0.1, off_surface: 1e-6 };
+/// let settings = Settings { size: 0.15, min_gamma: 0.1, off_surface: 1e-6, deviation: None };
 /// // The surface is a mesh of itself. With one triangle less it has a hole.
 /// let mut mesh = Mesh { triangulation: surface.clone(), mids, charts: None };
 /// let found = examine(&mesh, &surface, &charts, None, &settings);
@@ -379,6 +400,8 @@ pub fn examine(
         let Farthest { distance, at } = surface_to_mesh;
         defects.push(Defect::Lost { distance, limit, at });
     }
+    let deviation = settings.deviation.map(|limit| deviation::measure(mesh, surface, limit));
+    defects.extend(deviation.as_ref().and_then(deviates));
     let area_ratio = triangulation.area() / surface.area();
     defects.extend(area_defects(mesh, surface, charts, area_ratio, settings.size));
     let crossings = intersect::crossings(triangulation, &tree, surface, settings.off_surface * diagonal);
@@ -395,6 +418,7 @@ pub fn examine(
         area_ratio,
         mesh_to_surface,
         surface_to_mesh,
+        deviation,
         crossings_of_surface: crossings.in_surface,
         gamma_min: shapes.min,
         gamma_mean: shapes.mean,
@@ -403,6 +427,13 @@ pub fn examine(
         edges: elements::edge_lengths(triangulation, settings.size),
         defects,
     }
+}
+
+/// The defect that elements are too far from the surface, if any is.
+fn deviates(deviation: &Deviation) -> Option<Defect> {
+    let worst = deviation.too_far.iter().max_by(|a, b| a.distance.total_cmp(&b.distance))?;
+    let (elements, limit) = (deviation.too_far.len(), deviation.limit);
+    Some(Defect::Deviates { elements, distance: worst.distance, limit, at: worst.at })
 }
 
 /// Looks at every chart; how far the nodes are from the charts that they belong to.

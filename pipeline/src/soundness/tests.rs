@@ -58,7 +58,7 @@ impl Sample {
     }
 
     fn settings(&self) -> Settings {
-        Settings { size: self.size, min_gamma: 0.1, off_surface: 1e-6 }
+        Settings { size: self.size, min_gamma: 0.1, off_surface: 1e-6, deviation: None }
     }
 
     fn examined(&self, mesh: &Mesh) -> Findings {

@@ -70,8 +70,17 @@ impl VertexFans {
 
     /// Groups the corners of `triangles` through edges of at most so many of them.
     fn through(triangles: &[[VertexId; 3]], edges: &EdgeTable, most: usize) -> Self {
+        Self::across(triangles, edges, |sides| sides.len() <= most)
+    }
+
+    /// Groups the corners of `triangles` through the edges that join, told by their sides.
+    pub(crate) fn across(
+        triangles: &[[VertexId; 3]],
+        edges: &EdgeTable,
+        joins: impl Fn(&[HalfEdgeId]) -> bool,
+    ) -> Self {
         let mut sets = UnionFind::new(3 * triangles.len());
-        for (_, sides) in edges.iter().filter(|(_, sides)| sides.len() <= most) {
+        for (_, sides) in edges.iter().filter(|(_, sides)| joins(sides)) {
             for (a, b) in sides.windows(2).flat_map(|pair| matching_corners(triangles, pair[0], pair[1])) {
                 sets.merge(a, b);
             }

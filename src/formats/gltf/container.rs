@@ -3,11 +3,13 @@
 use super::GltfError;
 
 /// The first bytes of a container.
-const MAGIC: &[u8] = b"glTF";
+pub(super) const MAGIC: &[u8] = b"glTF";
 
-/// Kinds of chunks.
-const JSON: &[u8] = b"JSON";
-const BINARY: &[u8] = b"BIN\0";
+/// The kind of the chunk with the document.
+pub(super) const JSON: &[u8] = b"JSON";
+
+/// The kind of the chunk with the data.
+pub(super) const BINARY: &[u8] = b"BIN\0";
 
 /// The parts of a file.
 pub(super) struct Parts<'a> {

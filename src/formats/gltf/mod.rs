@@ -9,15 +9,17 @@
 mod accessor;
 mod buffers;
 mod container;
+pub mod glb;
 mod scene;
 mod tidy;
 
 use super::finish::{self, BadPoints};
-use super::{Content, Notes, ReadError, Source};
+use super::labels::{self, LabelError, Labels};
+use super::{Content, LabelSource, Notes, ReadError, Source};
 use crate::outcome::Code;
 use buffers::Buffers;
 use gltf::json::Root;
-use scene::Scene;
+use scene::{Part, Scene};
 use tidy::Document;
 
 /// Why bytes are no glTF file.
@@ -128,7 +130,7 @@ const HARMLESS: [&str; 11] = [
 /// Reads a glTF or GLB file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let parts = container::split(source.bytes)?;
-    let root = parse(parts.json)?;
+    let (root, materials) = parse(parts.json)?;
     refuse_extensions(&root)?;
     let buffers = Buffers::load(&root, parts.binary, source)?;
     let scene = Scene::read(&root, &buffers, source)?;
@@ -136,10 +138,35 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     notes.units = Some("m".to_owned());
     scene.names.iter().for_each(|name| notes.name(name));
     scene.skipped.iter().for_each(|(kind, count)| notes.skip(kind, *count));
-    finish::content(scene.points, scene.triangles, notes, &BadPoints::default())
+    let labels = labels(&root, &materials, &scene, source.labels)?;
+    finish::content(scene.points, scene.triangles, labels, notes, &BadPoints::default())
 }
 
-fn parse(json: &[u8]) -> Result<Root, GltfError> {
+/// The names of meshes, or of materials where these are asked for. Of several, those without a name are told by their number.
+fn labels(
+    root: &Root,
+    materials: &[Option<String>],
+    scene: &Scene,
+    source: &LabelSource,
+) -> Result<Labels, LabelError> {
+    let by_material = labels::asked(["mesh", "material"].into_iter(), source)? == Some("material");
+    let meshes: Vec<_> = root.meshes.iter().map(|mesh| mesh.name.clone()).collect();
+    let (kind, names) = if by_material { ("material", materials) } else { ("mesh", &meshes[..]) };
+    let number = |part: &Part| if by_material { part.material } else { Some(part.mesh) };
+    let are_several = scene.parts.windows(2).any(|pair| number(&pair[0]) != number(&pair[1]));
+    let mut labels = Labels::new(source);
+    for part in &scene.parts {
+        let number = number(part);
+        let named = number.and_then(|i| names.get(i)?.clone());
+        let by_number = number.filter(|_| are_several).map_or(String::new(), |i| format!("{kind}_{i}"));
+        let label = labels.named(&named.unwrap_or(by_number));
+        labels.fill(part.end, label);
+    }
+    Ok(labels)
+}
+
+/// The document, and the names of its materials.
+fn parse(json: &[u8]) -> Result<(Root, Vec<Option<String>>), GltfError> {
     // Some containers are filled up with zeros instead of blanks.
     let end = json.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1);
     let bare = json[..end].strip_prefix(b"\xef\xbb\xbf").unwrap_or(&json[..end]);
@@ -147,7 +174,7 @@ fn parse(json: &[u8]) -> Result<Root, GltfError> {
     let document = Document::new(bare).map_err(fail)?;
     match document.version() {
         Some(version) if version.split('.').next() != Some("2") => Err(GltfError::Version(escape(&version))),
-        _ => Root::from_slice(&document.tidied()).map_err(fail),
+        _ => Ok((Root::from_slice(&document.tidied()).map_err(fail)?, document.materials())),
     }
 }
 

@@ -17,7 +17,17 @@ pub(super) struct Scene {
     pub points: Vec<[f64; 3]>,
     pub triangles: Vec<[u32; 3]>,
     pub names: Vec<String>,
+    /// Per primitive that gave triangles: its mesh, its material, and where its triangles end.
+    pub parts: Vec<Part>,
     pub skipped: BTreeMap<&'static str, usize>,
+}
+
+/// The triangles of a primitive up to this one.
+#[derive(Clone, Copy)]
+pub(super) struct Part {
+    pub mesh: usize,
+    pub material: Option<usize>,
+    pub end: usize,
 }
 
 /// An affine map: three columns and the image of the origin.
@@ -115,6 +125,8 @@ impl Walk<'_> {
         self.scene.names.extend(found.name.clone());
         for (i, primitive) in found.primitives.iter().enumerate() {
             self.primitive(primitive, transform, &format!("meshes[{mesh}].primitives[{i}]"))?;
+            let material = primitive.material.map(|material| material.value());
+            self.scene.parts.push(Part { mesh, material, end: self.scene.triangles.len() });
         }
         Ok(())
     }

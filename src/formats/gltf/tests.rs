@@ -1,4 +1,4 @@
-use super::super::{Format, Limits, NoSiblings, SiblingFiles, read_alone};
+use super::super::{Format, Limits, SiblingFiles, read_alone};
 use super::*;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -220,10 +220,11 @@ fn nothing_is_asked_for_but_plain_names() {
         "./.hidden",
         "./",
     ];
+    let limits = Limits::default();
     for uri in foreign {
         let asked = Recorder::default();
         let document = with_uri(uri);
-        let source = Source { bytes: document.as_bytes(), limits: &Limits::default(), beside: &asked };
+        let source = Source { beside: &asked, ..Source::alone(document.as_bytes(), &limits) };
         let refused = super::super::read(Format::Gltf, &source).expect_err(uri);
         let ReadError::Gltf(GltfError::Uri { buffer: 0, .. }) = &refused else { panic!("{uri}: {refused}") };
         let reason = refused.reason();
@@ -239,12 +240,12 @@ fn nothing_is_asked_for_but_plain_names() {
     ];
     for (uri, name) in plain {
         let document = with_uri(uri);
-        let source = Source { bytes: document.as_bytes(), limits: &Limits::default(), beside: &asked };
+        let source = Source { beside: &asked, ..Source::alone(document.as_bytes(), &limits) };
         super::super::read(Format::Gltf, &source).expect("beside");
         assert_eq!(asked.0.borrow().last().map(String::as_str), Some(name));
     }
     let document = with_uri("a.bin");
-    let source = Source { bytes: document.as_bytes(), limits: &Limits::default(), beside: &NoSiblings };
+    let source = Source::alone(document.as_bytes(), &limits);
     let missing = super::super::read(Format::Gltf, &source).expect_err("not there").reason();
     assert_eq!(missing.code, Code::MissingFile);
 }
@@ -358,7 +359,7 @@ fn instances_do_not_take_memory_out_of_proportion() {
     let document = changed(&[("/nodes", many.into()), ("/scenes/0/nodes", list.into())]).to_string();
     let read = |expansion| {
         let limits = Limits { elements: 500, expansion, ..Limits::default() };
-        super::super::read(Format::Gltf, &Source { bytes: document.as_bytes(), limits: &limits, beside: &NoSiblings })
+        super::super::read(Format::Gltf, &Source::alone(document.as_bytes(), &limits))
     };
     assert!(matches!(read(100), Err(ReadError::Gltf(GltfError::TooMuch { .. }))));
     let zeros = changed(&[(
@@ -381,4 +382,29 @@ fn a_file_that_is_cut_off_anywhere_is_an_error() {
     }
     let deep = format!("{}{}", "[".repeat(200_000), "]".repeat(200_000));
     assert!(read_alone(Format::Gltf, deep.as_bytes()).is_err());
+}
+
+/// The names of all triangles.
+fn names(document: &Value, labels: &LabelSource) -> Vec<String> {
+    let (bytes, limits) = (document.to_string(), Limits::default());
+    let source = Source { labels, ..Source::alone(bytes.as_bytes(), &limits) };
+    let content = super::super::read(Format::Gltf, &source).expect("a square");
+    content.soup.labels().iter().map(|label| content.notes.labels[*label as usize].name.clone()).collect()
+}
+
+#[test]
+fn meshes_name_triangles_or_materials_do() {
+    assert_eq!(names(&square(), &LabelSource::Usual), ["square"; 2]);
+    let mut two = changed(&[("/nodes/1", json!({"mesh": 1})), ("/scenes/0/nodes", json!([0, 1]))]);
+    let primitive = two["meshes"][0]["primitives"][0].clone();
+    two["meshes"] = json!([two["meshes"][0], {"primitives": [primitive]}]);
+    two["meshes"][1]["primitives"][0]["material"] = json!(0);
+    two["materials"] = json!([{"name": "red paint"}]);
+    assert_eq!(names(&two, &LabelSource::Usual), ["square", "square", "mesh_1", "mesh_1"]);
+    let material = LabelSource::Array("material".to_owned());
+    assert_eq!(names(&two, &material), ["unnamed", "unnamed", "red paint", "red paint"]);
+    assert_eq!(names(&two, &LabelSource::Ignored), [""; 0]);
+    // A single mesh without a name is no part of anything.
+    let nameless = changed(&[("/meshes/0/name", Value::Null)]);
+    assert_eq!(names(&nameless, &LabelSource::Usual), [""; 0]);
 }

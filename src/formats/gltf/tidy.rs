@@ -41,6 +41,18 @@ impl<'a> Document<'a> {
         serde_json::from_str(asset.get()).ok().map(|asset: Asset| asset.version)
     }
 
+    /// The names of materials, of which nothing else is read.
+    pub fn materials(&self) -> Vec<Option<String>> {
+        #[derive(Deserialize)]
+        struct Material {
+            name: Option<String>,
+        }
+        let list = self.parts.get("materials").map_or("[]", |list| list.get());
+        let materials: Vec<&RawValue> = serde_json::from_str(list).unwrap_or_default();
+        let name = |text: &RawValue| serde_json::from_str(text.get()).ok().and_then(|m: Material| m.name);
+        materials.into_iter().map(name).collect()
+    }
+
     /// The text without what is not read.
     pub fn tidied(&self) -> Vec<u8> {
         let mut changes: Vec<Change> = UNREAD.iter().filter_map(|name| self.emptied(name)).collect();

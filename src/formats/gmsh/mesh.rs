@@ -1,7 +1,11 @@
 //! `$Nodes` and `$Elements`: the input triangulation, so that the atlas shows in Gmsh before it is remeshed, and
 //! other programs read it as a mesh. Gmsh replaces it when it remeshes.
+//!
+//! Elements are those of entities that are in a group, as in the files of Gmsh: meshio 5.3 refuses files in which some are and
+//! some are not.
 
 use super::Binary;
+use super::groups::{Group, tags_of};
 use planish_core::CertifiedChart;
 use planish_core::seams::{Curve, SeamNetwork};
 use planish_core::subdivide::LinearAtlas;
@@ -23,9 +27,21 @@ struct Block {
 }
 
 /// Appends both sections.
-pub fn write(out: &mut Binary, charts: &[CertifiedChart], linear: &LinearAtlas, network: &SeamNetwork) {
-    let (blocks, number) = blocks(charts, linear, network);
+pub fn write(
+    out: &mut Binary,
+    charts: &[CertifiedChart],
+    linear: &LinearAtlas,
+    network: &SeamNetwork,
+    groups: &[Group],
+) {
+    let (mut blocks, number) = blocks(charts, linear, network);
     out.section("Nodes", |out| nodes(out, &blocks, linear));
+    let of_curves = tags_of(groups, 1, network.curves().len());
+    blocks.retain(|block| match block.dimension {
+        0 => false,
+        1 => !of_curves[block.entity].is_empty(),
+        _ => true,
+    });
     out.section("Elements", |out| elements(out, &blocks, &number));
 }
 

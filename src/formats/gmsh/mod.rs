@@ -4,10 +4,14 @@
 
 mod binary;
 mod geo;
+mod groups;
 mod mesh;
+mod pos;
 mod read;
 
-pub use geo::{Algorithms, Ball, Narrow, Script, remesh};
+pub use geo::{Algorithms, Script, remesh};
+pub use groups::Group;
+pub use pos::sizes;
 pub use read::{AtlasError, read as read_atlas};
 
 use binary::Binary;
@@ -20,28 +24,32 @@ use planish_core::vec3::BoundingBox;
 /// The bytes of `atlas.msh`: MSH 4.1, binary, little endian.
 ///
 /// `$Entities` holds the boundary representation: a point for every end of a curve, its curves, a
-/// surface per chart. `$Parametrizations` holds the curves as polylines and the charts as triangulations in space
+/// surface per chart, and which physical groups these are in. `$Parametrizations` holds the curves as polylines and the charts as triangulations in space
 /// and in the plane, there in their own size ([`LinearChart::uv_scale`]); see docs/gmsh.md for what Gmsh asks of it.
 /// Tags are positions plus one.
-pub fn atlas(atlas: &CertifiedAtlas, linear: &LinearAtlas) -> Vec<u8> {
+pub fn atlas(atlas: &CertifiedAtlas, linear: &LinearAtlas, groups: &[Group]) -> Vec<u8> {
     let network = atlas.seams();
     let mut out = Binary::new();
-    out.section("Entities", |out| entities(out, linear, network));
-    mesh::write(&mut out, atlas.charts(), linear, network);
+    groups::names(&mut out, groups);
+    out.section("Entities", |out| entities(out, linear, network, groups));
+    mesh::write(&mut out, atlas.charts(), linear, network, groups);
     out.section("Parametrizations", |out| parametrizations(out, linear));
     out.bytes
 }
 
 /// The bytes of `atlas-enlarged.msh`: as [`atlas`], with all lengths multiplied by a power of two, and without the
 /// triangles of the input.
-pub fn enlarged(linear: &LinearAtlas, network: &SeamNetwork, factor: f64) -> Vec<u8> {
+pub fn enlarged(linear: &LinearAtlas, network: &SeamNetwork, groups: &[Group], factor: f64) -> Vec<u8> {
     let mut out = Binary { unit: factor, ..Binary::new() };
-    out.section("Entities", |out| entities(out, linear, network));
+    groups::names(&mut out, groups);
+    out.section("Entities", |out| entities(out, linear, network, groups));
     out.section("Parametrizations", |out| parametrizations(out, linear));
     out.bytes
 }
 
-fn entities(out: &mut Binary, linear: &LinearAtlas, network: &SeamNetwork) {
+fn entities(out: &mut Binary, linear: &LinearAtlas, network: &SeamNetwork, groups: &[Group]) {
+    let curve_groups = groups::tags_of(groups, 1, network.curves().len());
+    let surface_groups = groups::tags_of(groups, 2, linear.charts().len());
     for count in [network.points().len(), network.curves().len(), linear.charts().len(), 0] {
         out.size(count);
     }
@@ -53,6 +61,7 @@ fn entities(out: &mut Binary, linear: &LinearAtlas, network: &SeamNetwork) {
     for (curve, nodes) in network.curves().iter().zip(linear.curves()) {
         out.tag(curve.id().index());
         bounding_box(out, linear, nodes);
+        physical_tags(out, &curve_groups[curve.id().index()]);
         // A closed curve names its only point twice: as its begin and as its end.
         out.size(2);
         let [begin, end] = curve.ends();
@@ -62,6 +71,7 @@ fn entities(out: &mut Binary, linear: &LinearAtlas, network: &SeamNetwork) {
     for (index, chart) in linear.charts().iter().enumerate() {
         out.tag(index);
         bounding_box(out, linear, chart.nodes());
+        physical_tags(out, &surface_groups[index]);
         let passages = network.loops(ChartId::at(index)).concat();
         out.size(passages.len());
         passages.iter().for_each(|p| out.signed_tag(p.curve.index(), p.forward));
@@ -78,13 +88,18 @@ fn point_nodes(linear: &LinearAtlas, network: &SeamNetwork) -> Vec<u32> {
     nodes
 }
 
-/// The box around some nodes, and no physical groups.
+/// The physical groups of an entity.
+fn physical_tags(out: &mut Binary, tags: &[i32]) {
+    out.size(tags.len());
+    tags.iter().for_each(|tag| out.int(*tag));
+}
+
+/// The box around some nodes.
 fn bounding_box(out: &mut Binary, linear: &LinearAtlas, nodes: &[u32]) {
     let around = BoundingBox::of(nodes.iter().map(|n| linear.points()[*n as usize]));
     let around = around.unwrap_or(BoundingBox { min: [0.0; 3], max: [0.0; 3] });
     out.point(around.min);
     out.point(around.max);
-    out.size(0);
 }
 
 fn parametrizations(out: &mut Binary, linear: &LinearAtlas) {

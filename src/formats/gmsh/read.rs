@@ -35,7 +35,10 @@ pub fn read(bytes: &[u8]) -> Result<HandedOverAtlas, AtlasError> {
     if !bytes.starts_with(HEAD) {
         return Err(AtlasError::Format);
     }
-    let mut entities = Section::find(bytes, "Entities", HEAD.len())?;
+    let mut entities = match Section::find(bytes, "Entities", HEAD.len()) {
+        Err(_) => Section::find_after(bytes, "Entities", HEAD.len() - 1)?,
+        found => found?,
+    };
     let bounding = entities.entities()?;
     Section::find_after(bytes, "Parametrizations", entities.at)?.charts(bounding)
 }
@@ -102,6 +105,12 @@ impl<'a> Section<'a> {
         usize::try_from(count).ok().filter(|c| *c <= left).ok_or_else(|| self.damaged())
     }
 
+    /// Passes over the physical groups of an entity.
+    fn physical_tags(&mut self) -> Result<(), AtlasError> {
+        let tags = self.count(4)?;
+        self.skip(4 * tags)
+    }
+
     /// Per surface the curves that bound it.
     fn entities(&mut self) -> Result<Vec<Vec<u32>>, AtlasError> {
         let (points, curves, surfaces, _) = (self.count(1)?, self.count(1)?, self.count(1)?, self.count(1)?);
@@ -109,13 +118,15 @@ impl<'a> Section<'a> {
             self.skip(4 + 24 + 8)?;
         }
         for _ in 0..curves {
-            self.skip(4 + 48 + 8)?;
+            self.skip(4 + 48)?;
+            self.physical_tags()?;
             let ends = self.count(4)?;
             self.skip(4 * ends)?;
         }
         let mut bounding = Vec::new();
         for _ in 0..surfaces {
-            self.skip(4 + 48 + 8)?;
+            self.skip(4 + 48)?;
+            self.physical_tags()?;
             let mut of_surface = Vec::new();
             for _ in 0..self.count(4)? {
                 let tag = self.int()?.unsigned_abs();

@@ -1,10 +1,11 @@
 //! The text format of MEDIT, `.mesh` (Frey 2001, <https://inria.hal.science/inria-00069921>; today that of libMeshb).
 //!
 //! `MeshVersionFormatted`, `Dimension`, then sections in any order: a keyword, the number of records, and the records.
-//! Vertices count from 1, and each record ends with a reference, which is passed over. Triangles and quadrilaterals are
-//! the surface; those of second order are taken by their corners. Edges and elements of volumes are counted, all other
-//! sections are passed over, whatever they hold. In two dimensions z is 0. `#` begins a comment.
+//! Vertices count from 1, and each record ends with a reference. Triangles and quadrilaterals are the surface; those of
+//! second order are taken by their corners, and their references are labels. Edges and elements of volumes are counted,
+//! all other sections are passed over, whatever they hold. In two dimensions z is 0. `#` begins a comment.
 
+mod references;
 mod sections;
 
 use super::finish::{self, BadPoints};
@@ -13,6 +14,7 @@ use super::words::{Uncommented, Words, float, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
 use planish_core::vec3::Vec3;
+use references::References;
 use sections::{Kind, Section};
 
 /// Why bytes are no file of MEDIT.
@@ -132,7 +134,7 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     if !first.eq_ignore_ascii_case(b"MeshVersionFormatted") {
         return Err(MeditError::NotMedit { begins: escape(first) }.into());
     }
-    let mut file = File::new(source.limits);
+    let mut file = File::new(source);
     let mut values = Values { words, section: escape(first) };
     values.count()?;
     file.sections(&mut values)?;
@@ -147,7 +149,8 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     }
     let mut notes = file.notes;
     notes.mid_nodes = file.mid_nodes.iter().filter(|mid| **mid).count();
-    finish::content(file.points, file.triangles, notes, &file.bad)
+    let labels = file.references.labels(&mut notes)?;
+    finish::content(file.points, file.triangles, labels, notes, &file.bad)
 }
 
 /// The words of a section.
@@ -197,9 +200,9 @@ impl<'a> Values<'a> {
     }
 
     /// A reference, or whatever ends a record.
-    fn reference(&mut self) -> Result<(), MeditError> {
+    fn reference(&mut self) -> Result<&'a [u8], MeditError> {
         let word = self.word()?;
-        if is_keyword(word) { Err(self.wrong(word, String::new)) } else { Ok(()) }
+        if is_keyword(word) { Err(self.wrong(word, String::new)) } else { Ok(word) }
     }
 
     /// The number of records, of so many numbers each, for which there must be room.
@@ -228,6 +231,7 @@ struct File<'a> {
     points: Vec<Vec3>,
     bad: BadPoints,
     triangles: Vec<[u32; 3]>,
+    references: References,
     /// The points that lie on edges; none where there are no curved faces.
     mid_nodes: Vec<bool>,
     /// Faces that came before the vertices.
@@ -235,15 +239,16 @@ struct File<'a> {
 }
 
 impl<'a> File<'a> {
-    fn new(limits: &'a Limits) -> Self {
+    fn new(source: &Source<'a>) -> Self {
         Self {
-            limits,
+            limits: source.limits,
             notes: Notes::new("MEDIT, ASCII"),
             dimension: None,
             has_vertices: false,
             points: Vec::new(),
             bad: BadPoints::default(),
             triangles: Vec::new(),
+            references: References::new(source.labels),
             mid_nodes: Vec::new(),
             waiting: Vec::new(),
         }
@@ -326,8 +331,9 @@ impl<'a> File<'a> {
             for _ in 0..section.nodes {
                 nodes.push(values.vertex(self.points.len())?);
             }
-            values.reference()?;
+            let reference = values.reference()?;
             self.face(&nodes, corners);
+            self.references.add(reference, self.triangles.len(), values.line());
             TooMany::check("triangles", self.triangles.len() as u64, self.limits.elements)?;
         }
         Ok(())

@@ -1,6 +1,7 @@
 use super::*;
 use crate::formats::mutate::mutations;
-use crate::formats::{Format, NoSiblings, read_alone};
+use crate::formats::{Format, read_alone};
+use crate::settings::LabelSource;
 use planish_core::mesh::SoupError;
 
 fn content(text: &str) -> Result<Content, ReadError> {
@@ -118,7 +119,7 @@ fn broken_files_are_refused_with_code_and_place() {
 #[test]
 fn limits_are_kept() {
     let limits = Limits { elements: 4, ..Limits::default() };
-    let with = |text: String| read(&Source { bytes: text.as_bytes(), limits: &limits, beside: &NoSiblings });
+    let with = |text: String| read(&Source::alone(text.as_bytes(), &limits));
     assert!(with(square(&TWO.repeat(2))).is_ok());
     for many in [square(&TWO.repeat(3)), square(&"Quadrilaterals\n1\n1 2 3 4 0\n".repeat(3))] {
         assert_eq!(with(many).expect_err("too many").reason().code, Code::TooLarge);
@@ -132,4 +133,49 @@ fn mutated_files_do_no_harm() {
     let seed = square(&format!("{TWO}{sections}"));
     let accepted = mutations(seed.as_bytes(), 20_000).filter(|b| read_alone(Format::Medit, b).is_ok()).count();
     assert!(accepted > 500, "{accepted}");
+}
+
+fn labelled(text: &str, source: &LabelSource) -> Result<Content, ReadError> {
+    read(&Source { labels: source, ..Source::alone(text.as_bytes(), &Limits::default()) })
+}
+
+/// The names of the labels of the triangles, one after the other.
+fn names(content: &Content) -> Vec<&str> {
+    content.soup.labels().iter().map(|label| content.notes.labels[*label as usize].name.as_str()).collect()
+}
+
+#[test]
+fn references_that_differ_are_labels() {
+    let asked = |name: &str| LabelSource::Array(name.to_owned());
+    let sections = "Quadrilaterals\n1\n1 2 3 4 -5\nTrianglesP2\n1\n1 2 3 4 4 4 12\nTriangles 1 1 3 4 12.0\n";
+    // Faces may come before the points.
+    let late = format!("MeshVersionFormatted 1\n{sections}{}", &SQUARE[23..]);
+    for text in [square(sections), late] {
+        let found = labelled(&text, &LabelSource::Usual).expect("labels");
+        assert_eq!(names(&found), ["ref_-5", "ref_-5", "ref_12", "ref_12"]);
+        assert_eq!(labelled(&text, &asked("ref")), Ok(found));
+        assert!(labelled(&text, &LabelSource::Ignored).expect("a square").notes.labels.is_empty());
+    }
+    // One alone tells no parts apart.
+    let one = labelled(&square(TWO), &LabelSource::Usual).expect("a square");
+    assert!(one.notes.labels.is_empty() && one.soup.labels().is_empty() && one.notes.remarks.is_empty());
+    assert_eq!(names(&labelled(&square(TWO), &asked("ref")).expect("a label")), ["ref_7", "ref_7"]);
+    let missing = labelled(&square(TWO), &asked("reference")).expect_err("another name").reason();
+    assert!(missing.code == Code::NoLabels && missing.message.contains("there are ref"), "{missing:?}");
+}
+
+#[test]
+fn references_that_are_no_whole_numbers_are_told_or_refused() {
+    for bad in ["0.5", "nan", "x7", "1e300"] {
+        let broken = square(TWO).replace("3 4 7", &format!("3 4 {bad}"));
+        if bad == "x7" {
+            assert!(content(&broken).is_err(), "a keyword");
+            continue;
+        }
+        let found = content(&broken).expect("a square");
+        assert_eq!(found.soup, content(&square(TWO)).expect("a square").soup);
+        assert!(found.notes.remarks[0].contains(&format!("line 15: the reference \"{bad}\"")), "{:?}", found.notes);
+        let refused = labelled(&broken, &LabelSource::Array("ref".to_owned())).expect_err(bad).reason();
+        assert!(refused.message.contains(&format!("ref holds {bad} for triangle 1")), "{refused:?}");
+    }
 }

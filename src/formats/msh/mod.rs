@@ -2,8 +2,10 @@
 //!
 //! The triangles and quads of all entities together are the surface. Elements of higher order are taken by their
 //! corners: the nodes in the middle of edges and faces are left out and counted. Points, lines and elements of volumes
-//! are counted by kind. The names of physical groups are told; all other sections are passed over.
+//! are counted by kind. Physical groups of surfaces are labels, and their names are told; a view of nodes tells sizes, if it
+//! is asked for; all other sections are passed over.
 
+mod groups;
 mod nodes;
 mod plain;
 mod sections;
@@ -11,14 +13,18 @@ mod shapes;
 mod sparse;
 mod surface;
 mod values;
+mod views;
 
 use super::location::{Location, escape};
 use super::words::{Words, float};
 use super::{Content, Limits, Notes, Patches, ReadError, Source, TooMany};
 use crate::outcome::Code;
+use crate::settings::LabelSource;
+use groups::Groups;
 use nodes::Nodes;
 use surface::Surface;
 use values::{Binary, SectionError, Text, Values};
+use views::Views;
 
 /// Why bytes are no MSH file.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -205,18 +211,41 @@ enum Version {
 
 /// Reads an MSH file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
-    let (surface, notes) = surface(source, false)?;
-    surface.finish(notes)
+    let keep = if *source.labels == LabelSource::Ignored { Keep::Corners } else { Keep::Owners };
+    let Mesh { surface, groups, views, mut notes } = mesh(source, keep, Views::new(source.sizes))?;
+    let labels = groups.labels(surface.owners(), source.labels, &mut notes)?;
+    let sizes = views.sizes(&mut notes)?;
+    surface.finish(labels, sizes, notes)
 }
 
 /// Reads an MSH file with the entities of its triangles, and the nodes in the middle of their sides.
 pub(super) fn read_patches(source: &Source) -> Result<Patches, ReadError> {
-    let (surface, notes) = surface(source, true)?;
+    let Mesh { surface, notes, .. } = mesh(source, Keep::Patches, Views::default())?;
     surface.finish_patches(notes)
 }
 
+/// What is kept of triangles beside their corners.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Keep {
+    /// Nothing.
+    #[default]
+    Corners,
+    /// Their entities and physical groups.
+    Owners,
+    /// Their entities, and the nodes in the middle of their sides.
+    Patches,
+}
+
+/// What an MSH file holds.
+struct Mesh<'n> {
+    surface: Surface<'n>,
+    groups: Groups,
+    views: Views,
+    notes: Notes,
+}
+
 /// Reads the triangles of an MSH file.
-fn surface<'n>(source: &Source<'n>, keep: bool) -> Result<(Surface<'n>, Notes), ReadError> {
+fn mesh<'n>(source: &Source<'n>, keep: Keep, views: Views) -> Result<Mesh<'n>, ReadError> {
     let mut words = Words::new(source.bytes, 1);
     let mut begins = words.next().unwrap_or_default();
     while begins == b"$Comments" {
@@ -240,11 +269,12 @@ fn surface<'n>(source: &Source<'n>, keep: bool) -> Result<(Surface<'n>, Notes), 
         return Err(format_error(line, format!("numbers of {} bytes are not read, only of 8", escape(size))).into());
     }
     let name = escape(name);
+    let found = Found { keep, views, ..Found::default() };
     match encoding {
-        b"0" => body(Text(words), version, source.limits, keep, Notes::new(format!("MSH {name}, ASCII"))),
+        b"0" => body(Text(words), version, source.limits, found, Notes::new(format!("MSH {name}, ASCII"))),
         b"1" => {
             let (values, order) = binary(source.bytes, words)?;
-            body(values, version, source.limits, keep, Notes::new(format!("MSH {name}, binary, {order}")))
+            body(values, version, source.limits, found, Notes::new(format!("MSH {name}, binary, {order}")))
         }
         other => Err(format_error(line, format!("\"{}\" is neither 0 (ASCII) nor 1 (binary)", escape(other))).into()),
     }
@@ -279,8 +309,9 @@ fn binary<'a>(file: &'a [u8], words: Words<'a>) -> Result<(Binary<'a>, &'static 
 struct Found<'n> {
     nodes: Option<Nodes>,
     surface: Option<Surface<'n>>,
-    /// Whether more than the corners of triangles is kept.
-    keep: bool,
+    groups: Groups,
+    views: Views,
+    keep: Keep,
 }
 
 /// Reads all sections, from the end of the format on.
@@ -288,29 +319,35 @@ fn body<'a, 'n, V: Values<'a>>(
     mut values: V,
     version: Version,
     limits: &'n Limits,
-    keep: bool,
+    mut found: Found<'n>,
     mut notes: Notes,
-) -> Result<(Surface<'n>, Notes), ReadError> {
-    let mut found = Found { keep, ..Found::default() };
+) -> Result<Mesh<'n>, ReadError> {
     end_section(&mut values, b"MeshFormat")?;
     // Whatever stands between sections is a comment.
     while let Some(word) = values.word() {
         if let Some(name) = word.strip_prefix(b"$") {
             let section = escape(name);
-            found.section(name, &mut values, version, limits, &mut notes).map_err(|fault| match fault {
-                SectionError::End => MshError::Truncated { section, location: values.location() },
-                SectionError::Short => MshError::Short { section, location: values.location() },
-                SectionError::Value(problem) => MshError::Value { section, problem, location: values.location() },
-                SectionError::Told(error) => *error,
-            })?;
+            found
+                .section(name, &mut values, version, limits, &mut notes)
+                .map_err(|fault| told(fault, section, values.location()))?;
         }
     }
     match found.surface {
-        Some(surface) => Ok((surface, notes)),
+        Some(surface) => Ok(Mesh { surface, groups: found.groups, views: found.views, notes }),
         None => {
             let section = if found.nodes.is_some() { "Elements" } else { "Nodes" };
             Err(MshError::NoSection { section, late: false }.into())
         }
+    }
+}
+
+/// What is wrong in a section, with its place.
+fn told(fault: SectionError, section: String, location: Location) -> MshError {
+    match fault {
+        SectionError::End => MshError::Truncated { section, location },
+        SectionError::Short => MshError::Short { section, location },
+        SectionError::Value(problem) => MshError::Value { section, problem, location },
+        SectionError::Told(error) => *error,
     }
 }
 
@@ -344,7 +381,19 @@ impl<'n> Found<'n> {
                 }
             }
             (b"PhysicalNames", _) => {
-                names(values.until_end(name).ok_or(SectionError::End)?, notes);
+                let section = values.until_end(name).ok_or(SectionError::End)?;
+                self.groups.names(section, notes);
+                return Ok(());
+            }
+            (b"Entities", Version::FourZero | Version::Four) if self.keep == Keep::Owners => {
+                let section = values.section(name).ok_or(SectionError::End)?;
+                self.groups.entities(section, version);
+                return Ok(());
+            }
+            (b"NodeData", _) if self.views.are_wanted() => {
+                let section = values.section(name).ok_or(SectionError::End)?;
+                let nodes = self.surface.as_ref().map(|surface| &surface.nodes).or(self.nodes.as_ref());
+                self.views.read(section, nodes)?;
                 return Ok(());
             }
             _ => {
@@ -367,20 +416,6 @@ fn end_section<'a>(values: &mut impl Values<'a>, name: &[u8]) -> Result<(), MshE
         Some(word) if word.strip_prefix(b"$End") == Some(name) => Ok(()),
         Some(word) => Err(MshError::NoEnd { section, found: escape(word), location: values.location() }),
         None => Err(MshError::Truncated { section, location: values.location() }),
-    }
-}
-
-/// The names of physical groups: in each line one, between quotes.
-fn names(section: &[u8], notes: &mut Notes) {
-    for line in section.split(|byte| *byte == b'\n') {
-        let first = line.iter().position(|byte| *byte == b'"');
-        let last = line.iter().rposition(|byte| *byte == b'"');
-        // One alone is both.
-        if let (Some(first), Some(last)) = (first, last)
-            && first < last
-        {
-            notes.name(&String::from_utf8_lossy(&line[first + 1..last]));
-        }
     }
 }
 

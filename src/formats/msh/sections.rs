@@ -1,6 +1,7 @@
 //! The sections of nodes and elements, of MSH 2, MSH 4.0 and MSH 4.1.
 
 use super::MshError;
+use super::groups::Owner;
 use super::nodes::Nodes;
 use super::plain::Layout;
 use super::shapes::{Kind, Shape};
@@ -11,7 +12,13 @@ use crate::formats::{Limits, TooMany};
 use planish_core::vec3::Vec3;
 
 /// Checks that so many records can be there, of so many bytes each at least.
-fn fits<'a, V: Values<'a>>(values: &V, what: &'static str, count: u64, bytes: u64, most: u64) -> Result<(), MshError> {
+pub fn fits<'a, V: Values<'a>>(
+    values: &V,
+    what: &'static str,
+    count: u64,
+    bytes: u64,
+    most: u64,
+) -> Result<(), MshError> {
     let needed = count.saturating_mul(bytes);
     let left = values.left();
     if needed > left {
@@ -173,14 +180,16 @@ fn lines_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64)
     Ok(())
 }
 
-/// The further tags of an element: the second one is that of its entity.
+/// The further tags of an element: the first one is that of its physical group, the second one that of its entity.
 fn tags_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, tags: u64) -> Result<(), SectionError> {
-    if tags < 2 {
-        return values.skip(tags, V::INT);
+    surface.owner = Owner::default();
+    if tags > 0 {
+        surface.owner.group = values.int()?.saturating_abs();
     }
-    values.skip(1, V::INT)?;
-    surface.entity = values.int()?;
-    values.skip(tags - 2, V::INT)
+    if tags > 1 {
+        surface.owner.entity = values.int()?;
+    }
+    values.skip(tags.saturating_sub(2), V::INT)
 }
 
 /// Elements of one type together: type, how many, number of further tags; then of each its tag, these, nodes.
@@ -191,12 +200,13 @@ fn blocks_2<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface, count: u64
         let shape = shape(values, number)?;
         within(values, "elements", block, left, count)?;
         left -= block;
+        surface.owner = Owner::default();
         if let Kind::Other(kind) = shape.kind {
             surface.skip(kind, block);
             skip_records(values, block, 1 + tags + shape.nodes as u64, V::INT)?;
             continue;
         }
-        let layout = Layout { shape, before: tags.saturating_add(1), size: V::INT };
+        let layout = Layout { shape, tags, size: V::INT };
         let plain = values.binary().map_or(0, |binary| surface.plain(binary, layout, block));
         for _ in plain..block {
             let element = values.natural()?;
@@ -212,31 +222,40 @@ pub fn elements_4_1<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) ->
     values.end_line();
     let (blocks, count) = (values.size()?, values.size()?);
     values.skip(2, V::SIZE)?;
-    elements_4(values, surface, [blocks, count], (V::SIZE, V::size))
+    let how = Blocks { size: V::SIZE, tag: V::size, has_dimension_first: true };
+    elements_4(values, surface, [blocks, count], how)
 }
 
-/// `$Elements` of MSH 4.0: without the least and the largest tag.
+/// `$Elements` of MSH 4.0: without the least and the largest tag, and the tag of an entity stands before its dimension.
 pub fn elements_4_0<'a, V: Values<'a>>(values: &mut V, surface: &mut Surface) -> Result<(), SectionError> {
     values.end_line();
     let (blocks, count) = (values.size()?, values.size()?);
-    elements_4(values, surface, [blocks, count], (V::INT, V::natural))
+    let how = Blocks { size: V::INT, tag: V::natural, has_dimension_first: false };
+    elements_4(values, surface, [blocks, count], how)
 }
 
-/// The bytes of a tag, and what reads one.
-type Tag<V> = (u64, fn(&mut V) -> Result<u64, SectionError>);
+/// How blocks of elements are written.
+struct Blocks<V> {
+    /// Bytes of a tag.
+    size: u64,
+    /// What reads a tag.
+    tag: fn(&mut V) -> Result<u64, SectionError>,
+    /// Whether the dimension of the entity stands before its tag.
+    has_dimension_first: bool,
+}
 
 /// Elements of MSH 4, in blocks.
 fn elements_4<'a, V: Values<'a>>(
     values: &mut V,
     surface: &mut Surface,
     [blocks, count]: [u64; 2],
-    (size, tag): Tag<V>,
+    Blocks { size, tag, has_dimension_first }: Blocks<V>,
 ) -> Result<(), SectionError> {
     fits(values, "elements", count, 2 * size, surface.limits.elements)?;
     let mut left = count;
     for _ in 0..blocks {
-        values.skip(1, V::INT)?;
-        surface.entity = values.int()?;
+        let [first, second] = [values.int()?, values.int()?];
+        surface.owner = Owner { group: 0, entity: if has_dimension_first { second } else { first } };
         let (number, block) = (values.int()?, values.size()?);
         let shape = shape(values, number)?;
         within(values, "elements", block, left, count)?;
@@ -246,7 +265,7 @@ fn elements_4<'a, V: Values<'a>>(
             skip_records(values, block, 1 + shape.nodes as u64, size)?;
             continue;
         }
-        let layout = Layout { shape, before: 1, size };
+        let layout = Layout { shape, tags: 0, size };
         let plain = values.binary().map_or(0, |binary| surface.plain(binary, layout, block));
         for _ in plain..block {
             let element = tag(values)?;

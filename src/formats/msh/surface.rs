@@ -1,12 +1,16 @@
 //! The triangles of an MSH file, as its elements come.
 
-use super::MshError;
+use super::groups::{Owner, Owners};
 use super::nodes::Nodes;
 use super::shapes::{Kind, Shape};
 use super::values::{SectionError, Values};
+use super::{Keep, MshError};
 use crate::formats::finish;
+use crate::formats::labels::Labels;
 use crate::formats::location::Location;
+use crate::formats::point_sizes::{self, PointSizes};
 use crate::formats::{Content, Limits, Notes, Patches, ReadError, TooMany, polygon};
+use crate::settings::LabelSource;
 use std::collections::BTreeMap;
 
 /// Nodes, and the triangles so far.
@@ -23,8 +27,10 @@ pub struct Surface<'n> {
     at_hand: Vec<u64>,
     /// What is kept of each triangle beside its corners, where that is asked for.
     kept: Option<Kept>,
-    /// The entity of the elements at hand.
-    pub(super) entity: i64,
+    /// Which group and entity the elements at hand belong to.
+    pub(super) owner: Owner,
+    /// Those of all triangles, where they are asked for.
+    owners: Option<Owners>,
     pub limits: &'n Limits,
 }
 
@@ -39,6 +45,12 @@ fn numbers_without(mids: &[bool]) -> Vec<u32> {
     numbers
 }
 
+/// Leaves out what belongs to nodes in the middle.
+fn without<T>(mids: &[bool], of_nodes: &mut Vec<T>) {
+    let mut left_out = mids.iter();
+    of_nodes.retain(|_| left_out.next() != Some(&true));
+}
+
 /// What meshes tell of a triangle beside its corners.
 #[derive(Default)]
 struct Kept {
@@ -48,12 +60,12 @@ struct Kept {
 }
 
 impl<'n> Surface<'n> {
-    /// No triangles. Those to come are remembered with their entities and the nodes in the middle of their sides, if
-    /// `keep` says so.
-    pub fn new(nodes: Nodes, limits: &'n Limits, keep: bool) -> Self {
+    /// No triangles. Of those to come, so much is kept.
+    pub(super) fn new(nodes: Nodes, limits: &'n Limits, keep: Keep) -> Self {
         let (mids, triangles, skipped, at_hand) = (Vec::new(), Vec::new(), BTreeMap::new(), Vec::new());
-        let kept = keep.then(Kept::default);
-        Self { nodes, mids, triangles, skipped, polygons: [0; 2], at_hand, kept, entity: 0, limits }
+        let kept = (keep == Keep::Patches).then(Kept::default);
+        let (owner, owners) = (Owner::default(), (keep == Keep::Owners).then(Owners::default));
+        Self { nodes, mids, triangles, skipped, polygons: [0; 2], at_hand, kept, owner, owners, limits }
     }
 
     /// Whether elements must be looked at one by one.
@@ -104,7 +116,7 @@ impl<'n> Surface<'n> {
         if let Some(kept) = &mut self.kept {
             let is_quadratic = shape.kind == Kind::Triangle && shape.nodes == 6;
             kept.mids.resize(self.triangles.len(), is_quadratic.then_some(mids));
-            kept.entities.resize(self.triangles.len(), self.entity);
+            kept.entities.resize(self.triangles.len(), self.owner.entity);
         }
         Ok(TooMany::check("triangles", self.triangles.len() as u64, self.limits.elements)?)
     }
@@ -123,6 +135,15 @@ impl<'n> Surface<'n> {
         let is_doubtful = polygon::add(corners, &self.nodes.points, &mut self.triangles);
         self.polygons[0] += usize::from(corners.len() > 3);
         self.polygons[1] += usize::from(is_doubtful);
+        if let Some(owners) = &mut self.owners {
+            owners.add(self.owner, self.triangles.len());
+        }
+    }
+
+    /// The owners of the triangles; of none where they are not asked for.
+    pub(super) fn owners(&self) -> &Owners {
+        static NONE: Owners = Owners(Vec::new());
+        self.owners.as_ref().unwrap_or(&NONE)
     }
 
     /// All triangles with all that was kept of them, and all nodes.
@@ -134,12 +155,13 @@ impl<'n> Surface<'n> {
         }
         // Nodes in the middle of sides must be points that can be, as corners must.
         triangles.extend(mids.iter().flatten());
-        let Content { soup, .. } = finish::content(nodes.points, triangles, notes, &nodes.bad)?;
+        let Content { soup, .. } =
+            finish::content(nodes.points, triangles, Labels::new(&LabelSource::Ignored), notes, &nodes.bad)?;
         Ok(Patches::new(&soup, mids, Some(entities)))
     }
 
-    /// All triangles, and the nodes without those that lie in the middle of edges and faces only.
-    pub fn finish(self, mut notes: Notes) -> Result<Content, ReadError> {
+    /// All triangles, and the nodes without those that lie in the middle of edges and faces only, with their sizes.
+    pub fn finish(self, labels: Labels, mut sizes: Option<PointSizes>, mut notes: Notes) -> Result<Content, ReadError> {
         let Self { nodes, mut mids, mut triangles, .. } = self;
         for (kind, count) in self.skipped {
             notes.skip(kind, usize::try_from(count).unwrap_or(usize::MAX));
@@ -153,8 +175,10 @@ impl<'n> Surface<'n> {
             }
             notes.mid_nodes = mids.iter().filter(|mid| **mid).count();
             let numbers = numbers_without(&mids);
-            let mut left_out = mids.iter();
-            points.retain(|_| left_out.next() != Some(&true));
+            without(&mids, &mut points);
+            if let Some(sizes) = &mut sizes {
+                without(&mids, &mut sizes.values);
+            }
             for triangle in &mut triangles {
                 *triangle = triangle.map(|node| numbers[node as usize]);
             }
@@ -163,6 +187,6 @@ impl<'n> Surface<'n> {
                 *node = numbers[*node] as usize;
             }
         }
-        finish::content(points, triangles, notes, &bad)
+        Ok(point_sizes::give(finish::content(points, triangles, labels, notes, &bad)?, sizes))
     }
 }

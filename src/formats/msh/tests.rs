@@ -1,11 +1,11 @@
 use super::*;
+use crate::formats::Limits;
 use crate::formats::mutate::mutations;
-use crate::formats::{Limits, NoSiblings};
 use planish_core::mesh::SoupError;
 use planish_core::vec3::Vec3;
 
 fn content(bytes: &[u8]) -> Result<Content, ReadError> {
-    read(&Source { bytes, limits: &Limits::default(), beside: &NoSiblings })
+    read(&Source::alone(bytes, &Limits::default()))
 }
 
 /// How a file is written.
@@ -26,6 +26,8 @@ struct Mesh {
     blocks: Vec<(i64, Vec<Vec<u64>>)>,
     /// Text of further sections before the nodes.
     more: &'static str,
+    /// The surface of each block, and its physical groups; of none where nothing is told of entities.
+    parts: Vec<(i64, Vec<i64>)>,
 }
 
 /// A file on its way.
@@ -82,6 +84,9 @@ impl Mesh {
         }
         file.text("$EndMeshFormat\n");
         file.text(self.more);
+        if version.starts_with('4') && !self.parts.is_empty() {
+            self.entities(&mut file, version);
+        }
         if ["4", "4.0"].contains(&version) {
             self.sections_4_0(&mut file)
         } else if version.starts_with('4') {
@@ -90,6 +95,42 @@ impl Mesh {
             self.sections_2(&mut file)
         }
         file.bytes
+    }
+
+    /// A point, a curve and the surfaces; the others have physical groups, too.
+    fn entities(&self, file: &mut File, version: &str) {
+        let box_of_points = if version == "4.1" { 3 } else { 6 };
+        file.text("$Entities\n");
+        [1, 1, self.parts.len() as u64, 0].into_iter().for_each(|count| file.size(count));
+        for (numbers, bounds, (tag, groups)) in [(box_of_points, false, (3, vec![71])), (6, true, (4, vec![72, 73]))] {
+            self.entity(file, numbers, bounds, tag, &groups);
+        }
+        for (tag, groups) in &self.parts {
+            self.entity(file, 6, true, *tag, groups);
+        }
+        file.text("\n$EndEntities\n");
+    }
+
+    fn entity(&self, file: &mut File, numbers: usize, has_bounds: bool, tag: i64, groups: &[i64]) {
+        file.line();
+        file.int(tag);
+        (0..numbers).for_each(|number| file.double(number as f64));
+        file.size(groups.len() as u64);
+        groups.iter().for_each(|group| file.int(*group));
+        if has_bounds {
+            file.size(2);
+            [4, -4].into_iter().for_each(|bound| file.int(bound));
+        }
+    }
+
+    /// The physical group and the entity of a block.
+    fn owner(&self, block: usize) -> [i64; 2] {
+        self.parts.get(block).map_or([0, 9], |(entity, groups)| [groups.first().map_or(0, |g| g.abs()), *entity])
+    }
+
+    /// The entity of a block, from version 4 on.
+    fn entity_of(&self, block: usize) -> i64 {
+        self.parts.get(block).map_or(5, |part| part.0)
     }
 
     fn elements(&self) -> usize {
@@ -111,7 +152,7 @@ impl Mesh {
         }
         file.text(&format!("\n$End{name}\n$Elements\n{}\n", self.elements()));
         let mut tag = 100;
-        for (number, elements) in &self.blocks {
+        for (block, (number, elements)) in self.blocks.iter().enumerate() {
             if file.encoding != Ascii {
                 [*number, elements.len() as i64, 2].into_iter().for_each(|i| file.int(i));
             }
@@ -121,7 +162,7 @@ impl Mesh {
                 if file.encoding == Ascii {
                     [*number, 2].into_iter().for_each(|i| file.int(i));
                 }
-                [8, 9].into_iter().for_each(|i| file.int(i));
+                self.owner(block).into_iter().for_each(|i| file.int(i));
                 nodes.iter().for_each(|n| file.int(*n as i64));
                 file.line();
             }
@@ -146,9 +187,9 @@ impl Mesh {
         file.text("\n$EndNodes\n$Elements\n");
         [self.blocks.len() as u64, self.elements() as u64, 1, 9].into_iter().for_each(|i| file.size(i));
         let mut tag = 100;
-        for (number, elements) in &self.blocks {
+        for (block, (number, elements)) in self.blocks.iter().enumerate() {
             file.line();
-            [2, 5, *number].into_iter().for_each(|i| file.int(i));
+            [2, self.entity_of(block), *number].into_iter().for_each(|i| file.int(i));
             file.size(elements.len() as u64);
             for nodes in elements {
                 tag += 1;
@@ -178,9 +219,9 @@ impl Mesh {
         }
         file.text("\n$EndNodes\n$Elements\n");
         [self.blocks.len() as u64, self.elements() as u64].into_iter().for_each(|i| file.size(i));
-        for (number, elements) in &self.blocks {
+        for (block, (number, elements)) in self.blocks.iter().enumerate() {
             file.line();
-            [5, 2, *number].into_iter().for_each(|i| file.int(i));
+            [self.entity_of(block), 2, *number].into_iter().for_each(|i| file.int(i));
             file.size(elements.len() as u64);
             for (nodes, tag) in elements.iter().zip(101..) {
                 file.line();
@@ -222,7 +263,7 @@ fn in_all_encodings(mesh: &Mesh) -> Content {
 /// Two triangles of a square.
 fn square() -> Mesh {
     let nodes = vec![(1, [0.0; 3]), (2, [1.0, 0.0, 0.0]), (3, [1.0, 1.0, 0.0]), (4, [0.0, 1.0, 0.0])];
-    Mesh { parametric: None, nodes, blocks: vec![(2, vec![vec![1, 2, 3], vec![1, 3, 4]])], more: "" }
+    Mesh { parametric: None, nodes, blocks: vec![(2, vec![vec![1, 2, 3], vec![1, 3, 4]])], more: "", parts: vec![] }
 }
 
 fn error(bytes: &[u8]) -> MshError {
@@ -362,7 +403,7 @@ fn parameters_of_nodes_are_passed_over() {
 #[test]
 fn names_are_kept_and_other_sections_passed_over() {
     let more = "$PhysicalNames\n2\n2 7 \"the side wall\"\n2 8 \"$EndNodes \"lid\"\"\n$EndPhysicalNames\n\
-                a comment\n$Entities\n$Nodes $EndEntitiesx \x01\x02 $Elements\n$EndEntities\n$Comments\n\n$EndComments\n";
+                a comment\n$Periodic\n$Nodes $EndPeriodicx \x01\x02 $Elements\n$EndPeriodic\n$Comments\n\n$EndComments\n";
     let found = in_all_encodings(&Mesh { more, ..square() });
     assert_eq!(found.notes.names, ["the side wall", "$EndNodes \"lid\""]);
     let mut after = square().file("4.1", Little);
@@ -415,7 +456,7 @@ fn broken_files_are_refused_with_code_and_place() {
         (two.replace("2 1 0 0", "2 1 0,5 0"), Code::Malformed, Some("line 7"), "decimal comma"),
         (four.replace("4 1 0 0", "4 1.0D+00 0 0"), Code::Malformed, Some("line 9"), "Fortran exponent"),
         (two.replace("2 1 0 0", "2 1 x 0"), Code::Malformed, Some("line 7"), "\"x\" is no number"),
-        (two.replace("8 9 1 3 4", "8 9 1 3 5"), Code::Malformed, Some("line 15"), "element 102 names node 5"),
+        (two.replace("0 9 1 3 4", "0 9 1 3 5"), Code::Malformed, Some("line 15"), "element 102 names node 5"),
         (two.replace("102 2 2", "102 34 2"), Code::Malformed, Some("line 15"), "34 is no type"),
         (two.replace("102 2 2", "102 2 -2"), Code::Malformed, Some("line 15"), "-2 is negative"),
         (two.replace("$Elements\n2", "$Elements\n1"), Code::CountMismatch, Some("line 15"), "\"102\""),
@@ -482,7 +523,7 @@ fn a_file_cut_off_anywhere_is_refused() {
 #[test]
 fn limits_are_kept() {
     let limits = Limits { elements: 4, ..Limits::default() };
-    let with = |mesh: &Mesh| read(&Source { bytes: &mesh.file("2.2", Ascii), limits: &limits, beside: &NoSiblings });
+    let with = |mesh: &Mesh| read(&Source::alone(&mesh.file("2.2", Ascii), &limits));
     let of = |number, elements: usize| Mesh { blocks: vec![(number, vec![vec![1, 2, 3, 4]; elements])], ..square() };
     assert!(with(&of(3, 2)).is_ok());
     for mesh in [of(3, 3), of(4, 5)] {
@@ -505,3 +546,6 @@ fn mutated_files_do_no_harm() {
     }
     assert!(accepted > 5_000, "{accepted}");
 }
+
+mod groups;
+mod views;

@@ -47,11 +47,17 @@ pub trait Values<'a>: Clone {
     /// The next word of text.
     fn word(&mut self) -> Option<&'a [u8]>;
 
+    /// The next text, which stands between quotes in one line, or is a word.
+    fn text(&mut self) -> Option<&'a [u8]>;
+
     /// Ends a line of text, after which binary values begin.
     fn end_line(&mut self);
 
     /// The bytes up to the end of a section, which is passed over.
     fn until_end(&mut self, section: &[u8]) -> Option<&'a [u8]>;
+
+    /// The values up to the end of a section, which is passed over.
+    fn section(&mut self, section: &[u8]) -> Option<Self>;
 
     fn int(&mut self) -> Result<i64, SectionError>;
 
@@ -107,6 +113,22 @@ fn end_of(rest: &[u8], section: &[u8], is_binary: bool) -> Option<(usize, usize)
     Some((at, at + name.len()))
 }
 
+/// The next text, between quotes in one line or a word, and where it ends.
+fn quoted(rest: &[u8]) -> Option<(&[u8], usize)> {
+    let begin = rest.iter().position(|byte| !byte.is_ascii_whitespace())?;
+    let text = &rest[begin..];
+    match text.strip_prefix(b"\"") {
+        Some(quoted) => {
+            let end = memchr::memchr2(b'"', b'\n', quoted).filter(|end| quoted[*end] == b'"')?;
+            Some((&quoted[..end], begin + end + 2))
+        }
+        None => {
+            let end = text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
+            Some((&text[..end], begin + end))
+        }
+    }
+}
+
 /// Values as text. Their lines do not matter.
 #[derive(Clone)]
 pub struct Text<'a>(pub Words<'a>);
@@ -131,6 +153,12 @@ impl<'a> Values<'a> for Text<'a> {
         self.0.next()
     }
 
+    fn text(&mut self) -> Option<&'a [u8]> {
+        let (text, end) = quoted(self.0.rest())?;
+        self.0.advance(end);
+        Some(text)
+    }
+
     fn end_line(&mut self) {}
 
     fn until_end(&mut self, section: &[u8]) -> Option<&'a [u8]> {
@@ -138,6 +166,11 @@ impl<'a> Values<'a> for Text<'a> {
         let (at, end) = end_of(rest, section, false)?;
         self.0.advance(end);
         Some(&rest[..at])
+    }
+
+    fn section(&mut self, section: &[u8]) -> Option<Self> {
+        let line = self.0.line();
+        self.until_end(section).map(|text| Self(Words::new(text, line)))
     }
 
     #[inline]
@@ -212,6 +245,12 @@ impl<'a> Values<'a> for Binary<'a> {
         word
     }
 
+    fn text(&mut self) -> Option<&'a [u8]> {
+        let (text, end) = quoted(&self.file[self.at..])?;
+        self.at += end;
+        Some(text)
+    }
+
     fn end_line(&mut self) {
         let rest = self.rest();
         let end = [&b"\r\n"[..], b"\n"].into_iter().find(|end| rest.starts_with(end));
@@ -223,6 +262,12 @@ impl<'a> Values<'a> for Binary<'a> {
         let (at, end) = end_of(rest, section, true)?;
         self.at += end;
         Some(&rest[..at])
+    }
+
+    fn section(&mut self, section: &[u8]) -> Option<Self> {
+        let begin = self.at;
+        let bytes = self.until_end(section)?;
+        Some(Self { file: &self.file[..begin + bytes.len()], at: begin, big: self.big })
     }
 
     #[inline]

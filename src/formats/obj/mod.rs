@@ -1,18 +1,21 @@
 //! Wavefront OBJ, read by `tobj`.
 //!
-//! Only vertices and faces matter here, so only these reach the library, as it asks for them: lines that are continued
-//! are joined, comments, groups, materials, normals, texture coordinates, colours, points and lines are left out first. (With
+//! Only vertices and faces are for the library, so only these reach it, as it asks for them: lines that are continued
+//! are joined, comments, groups (which are labels), materials, normals, texture coordinates, colours, points and lines are left out first. (With
 //! groups the library would copy vertices; it takes lines of three and more points for faces, and refuses normals
 //! and texture coordinates that nobody needs.) Polygons are cut into triangles; vertices keep the numbers they have in
 //! the file.
 
+mod parts;
 mod statements;
+pub mod surface;
 
 use super::finish::{self, BadPoints};
 use super::location::{Location, escape};
 use super::words::{float, foreign_number, integer, no_number};
 use super::{Content, Limits, Notes, ReadError, Source, TooMany, polygon};
 use crate::outcome::Code;
+use parts::Parts;
 use planish_core::vec3::Vec3;
 use statements::{Kind, Plain, Statement, Statements, as_shown};
 
@@ -79,7 +82,8 @@ impl ObjError {
 /// Reads an OBJ file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let statements = Statements::new(source.bytes);
-    let geometry = check(&statements, source.limits)?;
+    let (geometry, parts) = check(&statements, source.limits)?;
+    let mut labels = parts.labels(source.labels)?;
     let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
     let loaded = tobj::load_obj_buf(
         &mut Plain::new(statements, !geometry.bad.0.is_empty()),
@@ -88,22 +92,13 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     );
     let (models, _) = loaded.map_err(|e| ObjError::Library { problem: e.to_string() })?;
     let mut notes = Notes::new("OBJ");
-    names(source.bytes).for_each(|name| notes.name(&String::from_utf8_lossy(name)));
+    parts.names().for_each(|name| notes.name(name));
     let mut triangles = Vec::with_capacity(geometry.triangles);
     for mesh in models.into_iter().map(|m| m.mesh) {
         geometry.agrees_with(&mesh.positions)?;
-        geometry.cut(&mesh, &mut triangles, &mut notes);
+        geometry.cut(&mesh, &mut triangles, &mut notes, |triangles| labels.face(triangles));
     }
-    finish::content(geometry.points, triangles, notes, &geometry.bad)
-}
-
-/// The names of objects and groups.
-fn names(file: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let lines = file.split(|b| [b'\n', b'\r'].contains(b)).map(<[u8]>::trim_ascii_start);
-    lines.filter_map(|line| match line {
-        [b'o' | b'g', b' ' | b'\t', name @ ..] => Some(name),
-        _ => None,
-    })
+    finish::content(geometry.points, triangles, labels.all, notes, &geometry.bad)
 }
 
 /// The vertices of a file in its own order, and in the order in which faces first use them, which is the library's.
@@ -126,8 +121,14 @@ impl Geometry {
         Err(ObjError::Library { problem: "vertices in an unexpected order".to_owned() })
     }
 
-    /// Cuts the faces that the library found into triangles.
-    fn cut(&self, mesh: &tobj::Mesh, triangles: &mut Vec<[u32; 3]>, notes: &mut Notes) {
+    /// Cuts the faces that the library found into triangles; after each, `face_ends` is told how many there are.
+    fn cut(
+        &self,
+        mesh: &tobj::Mesh,
+        triangles: &mut Vec<[u32; 3]>,
+        notes: &mut Notes,
+        mut face_ends: impl FnMut(usize),
+    ) {
         let mut corners = Vec::new();
         let mut rest = &mesh.indices[..];
         let mut sizes = mesh.face_arities.iter();
@@ -141,6 +142,7 @@ impl Geometry {
             if face.len() > 3 {
                 notes.polygon(is_doubtful);
             }
+            face_ends(triangles.len());
             rest = others;
         }
     }
@@ -171,12 +173,13 @@ impl Geometry {
 }
 
 /// Finds what the library would refuse without telling the line, and what is too much.
-fn check(statements: &Statements, limits: &Limits) -> Result<Geometry, ObjError> {
+fn check(statements: &Statements, limits: &Limits) -> Result<(Geometry, Parts), ObjError> {
     let vertices = statements.clone().filter(|s| s.kind == Kind::Vertex).count();
     TooMany::check("vertices", vertices as u64, limits.elements)?;
     let (points, bad) = (Vec::with_capacity(vertices), BadPoints::default());
     let mut geometry = Geometry { points, bad, first_used: Vec::new(), triangles: 0 };
     let mut used = vec![false; vertices];
+    let mut parts = Parts::default();
     for statement in statements.clone() {
         match statement.kind {
             Kind::Vertex => {
@@ -186,11 +189,13 @@ fn check(statements: &Statements, limits: &Limits) -> Result<Geometry, ObjError>
             }
             Kind::Face => {
                 geometry.face(&statement, &mut used)?;
+                parts.face();
                 TooMany::check("triangles", geometry.triangles as u64, limits.elements)?;
             }
+            Kind::Part(part) => parts.begin(part, statement.name()),
         }
     }
-    Ok(geometry)
+    Ok((geometry, parts))
 }
 
 fn syntax(statement: &Statement) -> ObjError {
@@ -216,7 +221,6 @@ fn point(statement: &Statement) -> Result<Vec3, ObjError> {
 mod tests {
     use super::*;
 
-    use crate::formats::NoSiblings;
     use planish_core::mesh::{SoupError, TriangleSoup};
 
     fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
@@ -224,7 +228,7 @@ mod tests {
     }
 
     fn limited(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, ReadError> {
-        super::read(&Source { bytes, limits, beside: &NoSiblings }).map(|content| content.soup)
+        super::read(&Source::alone(bytes, limits)).map(|content| content.soup)
     }
 
     const SQUARE: &str = "# caf\u{e9}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -261,7 +265,7 @@ mod tests {
         ];
         for (i, file) in files.iter().enumerate() {
             let soup = read(file.as_bytes()).unwrap_or_else(|e| panic!("file {i}: {e}"));
-            assert_eq!(soup, plain, "file {i}");
+            assert_eq!((soup.points(), soup.triangles()), (plain.points(), plain.triangles()), "file {i}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! The statements of an OBJ file that tell of vertices and faces. Nothing is copied.
+//! The statements of an OBJ file that tell of vertices and faces, and of the names of parts. Nothing is copied.
 
 use crate::formats::words::{comment, float};
 use planish_core::mesh::TriangleSoup;
@@ -11,9 +11,19 @@ pub enum Kind {
     Vertex,
     /// The vertices of a face.
     Face,
+    /// What the faces that follow are part of, by a name.
+    Part(Part),
 }
 
-/// A vertex or face.
+/// In which way a part has its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    Group,
+    Object,
+    Material,
+}
+
+/// A vertex or face, or the name of a part.
 #[derive(Clone, Copy)]
 pub struct Statement<'a> {
     pub kind: Kind,
@@ -29,6 +39,12 @@ impl<'a> Statement<'a> {
         let (most, faces) = if self.kind == Kind::Vertex { (3, false) } else { (usize::MAX, true) };
         let numbers = words(self.text, self.ends_with).skip(1).take(most);
         numbers.map(move |word| if faces { word.split(|b| *b == b'/').next().unwrap_or_default() } else { word })
+    }
+
+    /// What follows its keyword: the name of a part.
+    pub fn name(&self) -> String {
+        let words: Vec<_> = words(self.text, self.ends_with).skip(1).map(String::from_utf8_lossy).collect();
+        words.join(" ")
     }
 
     /// It without the end of the line.
@@ -72,7 +88,7 @@ fn words(text: &[u8], ends_with: u8) -> impl Iterator<Item = &[u8]> {
     text.split(move |b| *b == ends_with).flat_map(of_line)
 }
 
-/// The vertices and faces of a file, in their order.
+/// The vertices, faces and names of parts of a file, in their order.
 #[derive(Clone)]
 pub struct Statements<'a> {
     rest: &'a [u8],
@@ -119,6 +135,9 @@ impl<'a> Iterator for Statements<'a> {
                 Some(b"v") => Kind::Vertex,
                 // The old keyword "fo" means the same.
                 Some(b"f" | b"fo") => Kind::Face,
+                Some(b"g") => Kind::Part(Part::Group),
+                Some(b"o") => Kind::Part(Part::Object),
+                Some(b"usemtl") => Kind::Part(Part::Material),
                 _ => continue,
             };
             return Some(Statement { kind, line, text, ends_with: self.ends_with });
@@ -148,7 +167,8 @@ impl BufRead for Plain<'_> {
         if self.at == self.line.len() {
             self.line.clear();
             self.at = 0;
-            if let Some(statement) = self.statements.next() {
+            let mut shown = self.statements.by_ref().filter(|s| matches!(s.kind, Kind::Vertex | Kind::Face));
+            if let Some(statement) = shown.next() {
                 if self.is_sound {
                     statement.write(&mut self.line);
                 } else {
@@ -179,12 +199,14 @@ mod tests {
 
     #[test]
     fn statements_are_joined_and_stripped() {
-        let file = "\u{feff}v 0 0 0 1 # one\n\n  f 1/2/3 \\\n 2//4 # \\\nvt 0 0\n\tfo 3 \\ # two\n\\\n4 \\";
+        let file = "\u{feff}v 0 0 0 1 # one\ng a  b\n  f 1/2/3 \\\n 2//4 # \\\nvt 0 0\n\tfo 3 \\ # two\n\\\n4 \\";
         let mut plain = String::new();
         Plain::new(Statements::new(file.as_bytes()), false).read_to_string(&mut plain).expect("text");
         assert_eq!(plain, "v 0 0 0\nf 1 2\nf 3 4\n");
         let lines: Vec<usize> = Statements::new(file.as_bytes()).map(|s| s.line).collect();
-        assert_eq!(lines, [1, 3, 6]);
+        assert_eq!(lines, [1, 2, 3, 6]);
+        let part = Statements::new(file.as_bytes()).nth(1).expect("the second");
+        assert_eq!((part.kind, part.name().as_str()), (Kind::Part(Part::Group), "a b"));
         assert_eq!(Statements::new(b"v 1\rf 2\\\r3\r").map(|s| s.numbers().count()).collect::<Vec<_>>(), [1, 2]);
         assert_eq!(Statements::new(b"").count(), 0);
     }

@@ -7,6 +7,7 @@
 //! and other dimensions (`nOFF`) are refused, and so is the binary variant.
 
 use super::finish::{self, BadPoints};
+use super::labels::{self, Labels};
 use super::location::{Location, escape};
 use super::value_error::ValueError;
 use super::words::{Uncommented, Words, float, integer, no_number};
@@ -139,6 +140,8 @@ struct Counts {
 
 /// Reads an OFF file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
+    // Nothing names parts of the surface.
+    labels::asked([].into_iter(), source.labels)?;
     let mut words = Words::new(source.bytes, 1).without_comments();
     let mut notes = Notes::new("OFF");
     let counts = head(&mut words, source.limits)?;
@@ -148,7 +151,7 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     if let Some(word) = file.words.next() {
         return Err(OffError::Trailing { begins: escape(word), line: file.words.line() }.into());
     }
-    finish::content(file.points, file.triangles, notes, &file.bad)
+    finish::content(file.points, file.triangles, Labels::new(source.labels), notes, &file.bad)
 }
 
 /// Reads the keyword and the numbers of elements.

@@ -1,6 +1,6 @@
 use super::*;
 use crate::formats::mutate::mutations;
-use crate::formats::{Format, NoSiblings, read_alone};
+use crate::formats::{Format, read_alone};
 use planish_core::mesh::SoupError;
 
 fn content(text: &str) -> Result<Content, ReadError> {
@@ -82,7 +82,7 @@ fn broken_files_are_refused_with_code_and_place() {
 #[test]
 fn limits_are_kept() {
     let limits = Limits { elements: 4, ..Limits::default() };
-    let with = |text: String| read(&Source { bytes: text.as_bytes(), limits: &limits, beside: &NoSiblings });
+    let with = |text: String| read(&Source::alone(text.as_bytes(), &limits));
     assert!(with(square("OFF", &["3 0 1 2"; 4])).is_ok());
     for many in [square("OFF", &["3 0 1 2"; 5]), square("OFF", &["4 0 1 2 3"; 3])] {
         assert_eq!(with(many).expect_err("too many").reason().code, Code::TooLarge);

@@ -1,5 +1,6 @@
 //! Binary values of a PLY file.
 
+use super::face_labels::Place;
 use super::header::{Element, Property, Scalar};
 use super::values::{Values, whole};
 use crate::formats::location::Location;
@@ -43,25 +44,43 @@ impl<'a> Binary<'a> {
         Some(Table { bytes, stride, begin, big: self.big })
     }
 
-    /// Gives the corners of as many faces as are plain, of at most so many; how many they are.
-    pub fn faces(&mut self, plain: Plain, most: u64, give: impl FnMut(&[u32])) -> u64 {
+    /// Gives the corners, and the label at a place, of as many faces as are plain, of at most so many; how many they are.
+    pub fn faces(
+        &mut self,
+        plain: Plain,
+        most: u64,
+        label: Option<Place>,
+        give: impl FnMut(&[u32], Option<f64>),
+    ) -> u64 {
         match plain.count {
-            1 => self.lists::<1>(plain, most, give),
-            _ => self.lists::<4>(plain, most, give),
+            1 => self.lists::<1>(plain, most, label, give),
+            _ => self.lists::<4>(plain, most, label, give),
         }
     }
 
     /// The same, for lists after a number of `N` bytes.
-    fn lists<const N: usize>(&mut self, plain: Plain, most: u64, mut give: impl FnMut(&[u32])) -> u64 {
+    fn lists<const N: usize>(
+        &mut self,
+        plain: Plain,
+        most: u64,
+        label: Option<Place>,
+        mut give: impl FnMut(&[u32], Option<f64>),
+    ) -> u64 {
         let mut found = 0;
         while found < most {
-            let Some(list) = self.rest.get(plain.before..) else { break };
+            let record = self.rest;
+            let Some(list) = record.get(plain.before..) else { break };
             let Some((count, list)) = list.split_first_chunk::<N>() else { break };
             // The other bytes of a small number are zero.
             let count = ordered(*count, self.big);
+            let big = self.big;
+            let mut give = |corners: &[u32], behind: &[u8]| {
+                let value = |place: Place| value_at(if place.is_behind { behind } else { record }, place, big);
+                give(corners, label.map(value));
+            };
             let rest = match (count[0], count[1..].iter().all(|b| *b == 0)) {
-                (3, true) => plain.corners::<3>(list, self.big, &mut give),
-                (4, true) => plain.corners::<4>(list, self.big, &mut give),
+                (3, true) => plain.corners::<3>(list, big, &mut give),
+                (4, true) => plain.corners::<4>(list, big, &mut give),
                 _ => None,
             };
             let Some(rest) = rest else { break };
@@ -70,6 +89,13 @@ impl<'a> Binary<'a> {
         }
         found
     }
+}
+
+/// The value at a place of a record that is whole.
+#[inline]
+fn value_at(bytes: &[u8], place: Place, big: bool) -> f64 {
+    let rest = bytes.get(place.offset..).unwrap_or_default();
+    Binary { rest, end: 0, big }.float(place.scalar).unwrap_or(f64::NAN)
 }
 
 /// Faces with one list of 32-bit indices after a number of one byte or four, and nothing else of unknown size. They are
@@ -99,11 +125,17 @@ impl Plain {
         Some(Self { before, after, count, points })
     }
 
-    /// Gives the corners at the front of a list, if they are in range and the record is whole: what follows it.
+    /// Gives the corners at the front of a list, and what stands behind them, if they are in range and the record is whole:
+    /// what follows the record.
     #[inline]
-    fn corners<'a, const C: usize>(self, list: &'a [u8], big: bool, give: &mut impl FnMut(&[u32])) -> Option<&'a [u8]> {
-        let (bytes, rest) = list.split_at_checked(4 * C)?;
-        let rest = rest.get(self.after..)?;
+    fn corners<'a, const C: usize>(
+        self,
+        list: &'a [u8],
+        big: bool,
+        give: &mut impl FnMut(&[u32], &[u8]),
+    ) -> Option<&'a [u8]> {
+        let (bytes, behind) = list.split_at_checked(4 * C)?;
+        let rest = behind.get(self.after..)?;
         let mut corners = [0; C];
         for (corner, bytes) in corners.iter_mut().zip(bytes.as_chunks().0) {
             *corner = u32::from_le_bytes(ordered(*bytes, big));
@@ -111,7 +143,7 @@ impl Plain {
         if corners.iter().any(|corner| *corner >= self.points) {
             return None;
         }
-        give(&corners);
+        give(&corners, behind);
         Some(rest)
     }
 }

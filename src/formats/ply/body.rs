@@ -2,6 +2,7 @@
 
 use super::PlyError;
 use super::binary::Plain;
+use super::face_labels::{FaceLabels, Place, SURFACE};
 use super::header::{Element, Header, Property};
 use super::values::Values;
 use crate::formats::finish::BadPoints;
@@ -23,6 +24,16 @@ pub struct Body<'h> {
     pub points: Vec<Vec3>,
     pub triangles: Vec<[u32; 3]>,
     pub bad: BadPoints,
+    pub labels: FaceLabels,
+}
+
+/// What counts in the records of faces or strips.
+#[derive(Clone, Copy)]
+struct Columns {
+    /// The list of corners.
+    list: usize,
+    /// The label.
+    label: Option<usize>,
 }
 
 impl<'h> Body<'h> {
@@ -32,9 +43,10 @@ impl<'h> Body<'h> {
         mut values: impl Values<'a>,
         limits: &'h Limits,
         notes: &'h mut Notes,
+        labels: FaceLabels,
     ) -> Result<Self, PlyError> {
         let (points, triangles, bad) = (Vec::new(), Vec::new(), BadPoints::default());
-        let mut body = Self { limits, notes, points, triangles, bad };
+        let mut body = Self { limits, notes, points, triangles, bad, labels };
         body.check(header, values.rest().len())?;
         let mut waiting = Vec::new();
         let mut has_points = false;
@@ -44,8 +56,8 @@ impl<'h> Body<'h> {
                     (body.points, body.bad) = read_points(element, &mut values)?;
                     has_points = true;
                 }
-                "face" | "tristrips" if has_points => body.surface(element, &mut values)?,
-                "face" | "tristrips" => {
+                name if SURFACE.contains(&name) && has_points => body.surface(element, &mut values)?,
+                name if SURFACE.contains(&name) => {
                     waiting.push((element, values));
                     skip(element, &mut values)?;
                 }
@@ -92,7 +104,9 @@ impl<'h> Body<'h> {
             return Err(PlyError::NoProperty { element, property: "list vertex_indices", line });
         };
         let strips = element.name == "tristrips";
+        let columns = Columns { list, label: self.labels.position(element) };
         let plain = Plain::new(element, list, self.points.len()).filter(|_| !strips);
+        let place = columns.label.map(|label| Place::new(element, list, label));
         let mut corners = Vec::new();
         let mut number = 0;
         while number < element.count {
@@ -100,20 +114,23 @@ impl<'h> Body<'h> {
             if let Some((binary, plain)) = values.binary().zip(plain) {
                 // Each gives two triangles at most.
                 let room = self.limits.elements.saturating_sub(self.triangles.len() as u64) / 2;
-                number += binary.faces(plain, room.min(element.count - number), |corners| self.face(corners));
+                let most = room.min(element.count - number);
+                number += binary.faces(plain, most, place, |corners, label| self.labelled_face(corners, label));
                 if number == element.count {
                     break;
                 }
             }
-            self.corners(element, list, values, &mut corners).map_err(|bad| told(bad, element, number, values))?;
+            let label = self.record(element, columns, values, &mut corners);
+            let label = label.map_err(|bad| told(bad, element, number, values))?;
             if strips {
-                self.strip(&corners)
+                self.strip(&corners, label)
             } else {
-                self.face(&corners)
+                self.labelled_face(&corners, label)
             }
             self.few_enough()?;
             number += 1;
         }
+        self.labels.unnamed(self.triangles.len());
         Ok(())
     }
 
@@ -121,18 +138,23 @@ impl<'h> Body<'h> {
         Ok(TooMany::check("triangles", self.triangles.len() as u64, self.limits.elements)?)
     }
 
-    /// Reads a record: the corners that it lists.
-    fn corners<'a>(
+    /// Reads a record: the corners that it lists, and the value of its label.
+    fn record<'a>(
         &self,
         element: &Element,
-        list: usize,
+        columns: Columns,
         values: &mut impl Values<'a>,
         corners: &mut Vec<u32>,
-    ) -> Result<(), ValueError> {
+    ) -> Result<Option<f64>, ValueError> {
         corners.clear();
+        let mut label = None;
         for (p, property) in element.properties.iter().enumerate() {
+            if Some(p) == columns.label {
+                label = Some(label_value(values.float(property.scalar))?);
+                continue;
+            }
             let length = length(property, values)?;
-            if p != list {
+            if p != columns.list {
                 values.skip(property.scalar, length)?;
                 continue;
             }
@@ -140,7 +162,8 @@ impl<'h> Body<'h> {
                 corners.push(self.corner(values.integer(property.scalar)?, element)?);
             }
         }
-        values.end_record()
+        values.end_record()?;
+        Ok(label)
     }
 
     fn corner(&self, index: i64, element: &Element) -> Result<u32, ValueError> {
@@ -150,6 +173,15 @@ impl<'h> Body<'h> {
         found.or(restart.then_some(RESTART)).ok_or_else(|| {
             ValueError::Value(format!("vertex {index} is named, but there are {points} (counted from 0)"))
         })
+    }
+
+    #[inline]
+    fn labelled_face(&mut self, corners: &[u32], label: Option<f64>) {
+        let begin = self.triangles.len();
+        self.face(corners);
+        if let Some(label) = label {
+            self.labels.add(label, begin, self.triangles.len());
+        }
     }
 
     #[inline]
@@ -166,7 +198,8 @@ impl<'h> Body<'h> {
 
     /// Every other triangle of a strip has its first two corners exchanged. Triangles that name a corner twice only
     /// lead the strip on.
-    fn strip(&mut self, corners: &[u32]) {
+    fn strip(&mut self, corners: &[u32], label: Option<f64>) {
+        let begin = self.triangles.len();
         for strip in corners.split(|c| *c == RESTART) {
             for (i, corner) in strip.windows(3).enumerate() {
                 let [a, b, c] = [corner[i % 2], corner[1 - i % 2], corner[2]];
@@ -175,6 +208,17 @@ impl<'h> Body<'h> {
                 }
             }
         }
+        if let Some(label) = label {
+            self.labels.add(label, begin, self.triangles.len());
+        }
+    }
+}
+
+/// A label. What is no number refuses no file by itself: it is told at the end.
+fn label_value(value: Result<f64, ValueError>) -> Result<f64, ValueError> {
+    match value {
+        Err(ValueError::Value(_)) => Ok(f64::NAN),
+        other => other,
     }
 }
 

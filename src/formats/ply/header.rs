@@ -37,10 +37,6 @@ impl Scalar {
             _ => return None,
         })
     }
-
-    fn is_float(self) -> bool {
-        matches!(self, Self::F32 | Self::F64)
-    }
 }
 
 /// A value, or a list of values after their number.

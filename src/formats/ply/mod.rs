@@ -2,11 +2,12 @@
 //!
 //! Points are the element `vertex` with `x`, `y`, `z`; faces are the element `face` or `tristrips` with the list
 //! `vertex_indices` or `vertex_index`. All types are read everywhere, elements may come in any order, and other
-//! elements and properties are passed over. Polygons are cut into triangles; the triangles of a strip turn alternately,
-//! and -1 begins another strip.
+//! elements and properties are passed over, but for the one property of faces that labels them. Polygons are cut into
+//! triangles; the triangles of a strip turn alternately, and -1 begins another strip.
 
 mod binary;
 mod body;
+mod face_labels;
 mod header;
 mod values;
 
@@ -17,6 +18,7 @@ use super::{Content, Notes, ReadError, Source, TooMany};
 use crate::outcome::Code;
 use binary::Binary;
 use body::Body;
+use face_labels::FaceLabels;
 use header::{Encoding, Header};
 use values::Text;
 
@@ -152,18 +154,20 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
         Encoding::Little => "PLY, binary, little-endian",
         Encoding::Big => "PLY, binary, big-endian",
     });
+    let labels = FaceLabels::new(&header, source.labels)?;
     let body = match header.encoding {
         Encoding::Ascii => {
             let text = Text(Words::new(&source.bytes[header.end..], header.lines + 1));
-            Body::read(&header, text, source.limits, &mut notes)?
+            Body::read(&header, text, source.limits, &mut notes, labels)?
         }
         encoding => {
             let binary = Binary::new(source.bytes, header.end, encoding == Encoding::Big);
-            Body::read(&header, binary, source.limits, &mut notes)?
+            Body::read(&header, binary, source.limits, &mut notes, labels)?
         }
     };
     let (points, triangles, bad) = (body.points, body.triangles, body.bad);
-    finish::content(points, triangles, notes, &bad)
+    let labels = body.labels.finish(&mut notes)?;
+    finish::content(points, triangles, labels, notes, &bad)
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 use super::header::{Property, Scalar};
 use super::*;
+use crate::formats::Limits;
 use crate::formats::mutate::mutations;
-use crate::formats::{Limits, NoSiblings};
+use crate::settings::LabelSource;
 use planish_core::mesh::SoupError;
 
 fn content(bytes: &[u8]) -> Result<Content, ReadError> {
-    read(&Source { bytes, limits: &Limits::default(), beside: &NoSiblings })
+    read(&Source::alone(bytes, &Limits::default()))
 }
 
 fn error(bytes: &[u8]) -> PlyError {
@@ -241,7 +242,7 @@ fn a_file_cut_off_anywhere_is_refused() {
 #[test]
 fn limits_are_kept() {
     let limits = Limits { elements: 4, ..Limits::default() };
-    let with = |bytes: &[u8]| read(&Source { bytes, limits: &limits, beside: &NoSiblings });
+    let with = |bytes: &[u8]| read(&Source::alone(bytes, &limits));
     assert!(with(square(&["3 0 1 2"; 4]).as_bytes()).is_ok());
     let error = |bytes: &[u8]| with(bytes).expect_err("too many").reason().code;
     assert_eq!(error(square(&["3 0 1 2"; 5]).as_bytes()), Code::TooLarge);
@@ -261,4 +262,68 @@ fn mutated_files_do_no_harm() {
         accepted += mutations(&file, 20_000).filter(|bytes| content(bytes).is_ok()).count();
     }
     assert!(accepted > 1000, "{accepted}");
+}
+
+fn labelled(bytes: &[u8], source: &LabelSource) -> Result<Content, ReadError> {
+    read(&Source { labels: source, ..Source::alone(bytes, &Limits::default()) })
+}
+
+fn asked(name: &str) -> LabelSource {
+    LabelSource::Array(name.to_owned())
+}
+
+/// The names of the labels of the triangles, one after the other.
+fn names(content: &Content) -> Vec<&str> {
+    content.soup.labels().iter().map(|label| content.notes.labels[*label as usize].name.as_str()).collect()
+}
+
+/// Faces and strips, with properties before and behind the list, of these types.
+fn parts(before: &str, behind: &str) -> String {
+    format!(
+        "ply\nformat ascii 1.0\nelement face 3\nproperty uchar red\nproperty {before} region\n{LIST}property float area\n\
+         property {behind} other\nelement vertex 4\n{XYZ}element tristrips 1\nproperty {before} region\n\
+         property list int int vertex_indices\nend_header\n\
+         1 7 3 0 1 2 0.5 7\n2 9 4 0 1 2 3 0.5 9\n3 7 2 0 1 0.5 7\n{SQUARE}7 4 0 1 3 2\n"
+    )
+}
+
+#[test]
+fn properties_of_faces_label_their_triangles_in_all_encodings() {
+    for scalar in ["char", "uchar", "short", "ushort", "int", "uint", "int64", "uint64"] {
+        let ascii = parts(scalar, scalar);
+        for bytes in [ascii.clone().into_bytes(), binary(&ascii, false), binary(&ascii, true)] {
+            let usual = labelled(&bytes, &LabelSource::Usual).expect("labels");
+            assert_eq!(names(&usual), ["region_7", "region_7", "region_7", "region_9", "region_9"], "{scalar}");
+            assert_eq!(usual.notes.labels.iter().map(|label| label.tag).collect::<Vec<_>>(), [7, 9]);
+            // Faces that come before the points are read last, and the strip has no such property.
+            let other = labelled(&bytes, &asked("other")).expect("labels");
+            assert_eq!(names(&other), ["unnamed", "unnamed", "other_7", "other_9", "other_9"], "{scalar}");
+            let ignored = labelled(&bytes, &LabelSource::Ignored).expect("read");
+            assert!(ignored.soup.labels().is_empty() && ignored.soup.triangles() == usual.soup.triangles());
+            let missing = labelled(&bytes, &asked("label")).expect_err("missing").reason();
+            assert_eq!(missing.code, Code::NoLabels, "{missing:?}");
+            assert!(missing.message.contains("there are red, region, other, region;"), "{missing:?}");
+        }
+    }
+}
+
+#[test]
+fn measured_values_are_labels_if_they_are_asked_for_and_whole() {
+    let ascii = parts("double", "int");
+    let broken = ascii.replace("2 9 4 0", "2 9.5 4 0");
+    let at_no_triangle = ascii.replace("3 7 2 0", "3 0.5 2 0");
+    for encode in [|text: &str| text.as_bytes().to_vec(), |text: &str| binary(text, false), |t: &str| binary(t, true)] {
+        assert!(labelled(&encode(&ascii), &LabelSource::Usual).expect("read").soup.labels().is_empty());
+        for whole in [&ascii, &at_no_triangle] {
+            let found = labelled(&encode(whole), &asked("region")).expect("whole");
+            assert_eq!(names(&found), ["region_7", "region_7", "region_7", "region_9", "region_9"]);
+        }
+        let refused = labelled(&encode(&broken), &asked("region")).expect_err("not whole").reason();
+        assert_eq!(refused.code, Code::NoLabels);
+        assert!(refused.message.contains("region holds 9.5 for triangle 3"), "{refused:?}");
+        assert!(labelled(&encode(&ascii), &asked("vertex_indices")).is_err(), "a list");
+    }
+    let word = parts("int", "int").replace("2 9 4 0", "2 nine 4 0");
+    let found = labelled(word.as_bytes(), &LabelSource::Usual).expect("read without labels");
+    assert!(found.soup.labels().is_empty() && found.notes.remarks[0].contains("for triangle 3"), "{:?}", found.notes);
 }

@@ -8,6 +8,7 @@
 //! is told; text that ends in a facet is refused.
 
 use super::finish::{self, BadPoints};
+use super::labels::{self, Labels};
 use super::location::{Location, escape};
 use super::words::{float, foreign_number, no_number};
 use super::{Content, Notes, ReadError, Source, TooMany};
@@ -109,18 +110,20 @@ impl StlError {
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let (bytes, limit) = (source.bytes, source.limits.elements);
     let size = bytes.len() as u64;
+    labels::asked(["solid"].into_iter(), source.labels)?;
+    let mut labels = Labels::new(source.labels);
     let (facets, notes) = match declared(bytes) {
         Some(declared) if needed(declared) == size => binary_file(bytes, declared, limit)?,
         _ if begins_with_solid(unfilled(bytes)) => {
             let mut notes = Notes::new("STL, ASCII");
-            (ascii(unfilled(bytes), limit, &mut notes)?, notes)
+            (ascii(unfilled(bytes), limit, &mut notes, &mut labels)?, notes)
         }
         // Some programs append their own data. (Four letters of text would be a count of 7 GB and more.)
         Some(declared @ 1..) if needed(declared) < size => binary_file(bytes, declared, limit)?,
         declared => return Err(mismatch(declared, bytes).into()),
     };
     let triangles = (0..facets.corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    finish::content(facets.corners, triangles, notes, &facets.bad)
+    finish::content(facets.corners, triangles, labels, notes, &facets.bad)
 }
 
 /// The corners of all triangles, three each.
@@ -259,9 +262,10 @@ fn is(word: &[u8], keyword: &str) -> bool {
     word.eq_ignore_ascii_case(keyword.as_bytes())
 }
 
-/// The corners of all triangles of all solids.
-fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Facets, StlError> {
+/// The corners of all triangles of all solids, which are labels.
+fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes, labels: &mut Labels) -> Result<Facets, StlError> {
     let mut facets = Facets::default();
+    let mut solids = Solids::default();
     let mut words = Words::new(text(bytes));
     words.line += bytes[..bytes.len() - text(bytes).len()].iter().filter(|b| **b == b'\n').count();
     let mut in_solid = false;
@@ -276,7 +280,9 @@ fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Facets, StlError
                 (in_solid, ends_with_facet) = (true, false);
                 let rest = words.rest;
                 words.name();
-                notes.name(&String::from_utf8_lossy(&rest[..rest.len() - words.rest.len()]));
+                let name = String::from_utf8_lossy(&rest[..rest.len() - words.rest.len()]);
+                notes.name(&name);
+                solids.begin(&name, facets.corners.len() / 3);
             }
             (b"endsolid", None) => {
                 in_solid = false;
@@ -306,6 +312,7 @@ fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Facets, StlError
             _ => return Err(problem(&format!("unexpected \"{}\"", escape(word)))),
         }
     }
+    solids.label(facets.corners.len() / 3, labels);
     let line = words.line;
     if in_solid && !(ends_with_facet && corners.is_none()) {
         return Err(StlError::Truncated { line });
@@ -317,6 +324,29 @@ fn ascii(bytes: &[u8], limit: u64, notes: &mut Notes) -> Result<Facets, StlError
         ));
     }
     Ok(facets)
+}
+
+/// The solids of a file: their names, and their first triangles.
+#[derive(Default)]
+struct Solids(Vec<(String, usize)>);
+
+impl Solids {
+    fn begin(&mut self, name: &str, triangle: usize) {
+        self.0.push((name.trim().to_owned(), triangle));
+    }
+
+    /// Labels the triangles, which are so many. Of several solids those without a name are told by their number.
+    fn label(self, triangles: usize, labels: &mut Labels) {
+        let ends: Vec<usize> = self.0.iter().skip(1).map(|solid| solid.1).chain([triangles]).collect();
+        let filled = self.0.iter().zip(&ends).filter(|((_, begin), end)| begin < *end).count();
+        for (i, ((name, _), end)) in self.0.iter().zip(ends).enumerate() {
+            let label = match name.as_str() {
+                "" if filled > 1 => labels.named(&format!("solid_{}", i + 1)),
+                name => labels.named(name),
+            };
+            labels.fill(end, label);
+        }
+    }
 }
 
 /// The three numbers of a vertex; a fourth one is an error.

@@ -1,6 +1,6 @@
 use super::*;
 
-use crate::formats::{Limits, NoSiblings};
+use crate::formats::{LabelSource, Limits};
 use planish_core::mesh::TriangleSoup;
 
 fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
@@ -8,7 +8,7 @@ fn read(bytes: &[u8]) -> Result<TriangleSoup, ReadError> {
 }
 
 fn limited(bytes: &[u8], limits: &Limits) -> Result<TriangleSoup, ReadError> {
-    super::read(&Source { bytes, limits, beside: &NoSiblings }).map(|content| content.soup)
+    super::read(&Source::alone(bytes, limits)).map(|content| content.soup)
 }
 
 fn facet(x: &str) -> String {
@@ -78,7 +78,7 @@ fn count_and_size_must_agree() {
 }
 
 fn remarks(bytes: &[u8]) -> (usize, Vec<String>) {
-    let content = super::read(&Source { bytes, limits: &Limits::default(), beside: &NoSiblings }).expect("read");
+    let content = super::read(&Source::alone(bytes, &Limits::default())).expect("read");
     (content.soup.triangles().len(), content.notes.remarks)
 }
 
@@ -185,4 +185,27 @@ fn cut_off_and_garbled_files_are_refused() {
     assert!(matches!(error(b"\n\nsolid\n\nfacet normal 0 0 1 nonsense"), StlError::Syntax { line: 5, .. }));
     assert!(matches!(read(b"solid\nendsolid"), Err(ReadError::Soup { .. })), "no triangles");
     assert!(matches!(read(&binary_file(b"", 0, &[])), Err(ReadError::Soup { .. })), "no triangles");
+}
+
+#[test]
+fn solids_name_their_triangles() {
+    let names = |text: &str, labels: &LabelSource| {
+        let limits = Limits::default();
+        let content = super::read(&Source { labels, ..Source::alone(text.as_bytes(), &limits) })?;
+        let name = |label: &u32| content.notes.labels[*label as usize].name.clone();
+        Ok::<Vec<String>, ReadError>(content.soup.labels().iter().map(name).collect())
+    };
+    let usual = |text: &str| names(text, &LabelSource::Usual).expect("solids");
+    let [one, two] = [facet("0"), facet("1")];
+    let file = format!(
+        "solid heated wall\n{one}{two}endsolid\nsolid empty\nendsolid\nsolid b\n{one}endsolid b\nsolid heated wall\n{two}endsolid"
+    );
+    assert_eq!(usual(&file), ["heated wall", "heated wall", "b", "heated wall"]);
+    let nameless = format!("solid\n{one}endsolid\nsolid\n{two}endsolid");
+    assert_eq!(usual(&nameless), ["solid_1", "solid_2"]);
+    assert_eq!(usual(&format!("solid\n{one}endsolid")), [""; 0]);
+    assert_eq!(names(&file, &LabelSource::Ignored).expect("solids"), [""; 0]);
+    assert_eq!(names(&file, &LabelSource::Array("solid".to_owned())).expect("solids").len(), 4);
+    let missing = names(&file, &LabelSource::Array("region".to_owned())).expect_err("no region");
+    assert_eq!(missing.reason().code, Code::NoLabels);
 }

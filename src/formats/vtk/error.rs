@@ -4,7 +4,7 @@ pub(super) use crate::formats::location::{Location, escape};
 use crate::outcome::Code;
 
 /// Why bytes are no VTK file, or none with a surface.
-#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum VtkError {
     /// Neither a legacy nor an XML file.
     #[error(

@@ -15,8 +15,9 @@ pub(super) struct Arrays<'a> {
     pub binary: bool,
 }
 
-/// The type of an array that is passed over.
-enum Kind {
+/// The type of an array of data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
     Number(Scalar),
     /// Eight to a byte.
     Bit,
@@ -42,17 +43,21 @@ impl<'a> Arrays<'a> {
     }
 
     /// The next keyword, in upper case, after what is told about the array before it.
-    pub fn keyword(&mut self) -> Result<Option<Vec<u8>>, VtkError> {
+    pub fn keyword(&mut self) -> Option<Vec<u8>> {
+        self.name().map(<[u8]>::to_ascii_uppercase)
+    }
+
+    /// The next word, after what is told about the array before it.
+    pub fn name(&mut self) -> Option<&'a [u8]> {
         while let Some(word) = self.text.word() {
-            let word = word.to_ascii_uppercase();
-            if word != b"METADATA" {
-                return Ok(Some(word));
+            if !word.eq_ignore_ascii_case(b"METADATA") {
+                return Some(word);
             }
             // It ends with an empty line.
             self.text.line();
             while self.text.line().is_some_and(|line| !line.trim_ascii().is_empty()) {}
         }
-        Ok(None)
+        None
     }
 
     /// The error that the file ends before this.
@@ -65,19 +70,27 @@ impl<'a> Arrays<'a> {
         self.syntax(format!("unexpected \"{}\" where {expected} may stand", escape(word)))
     }
 
-    fn syntax(&self, problem: String) -> VtkError {
+    /// The error that something makes no sense here.
+    pub fn syntax(&self, problem: String) -> VtkError {
         VtkError::Syntax { location: self.location(), problem }
     }
 
     /// A number of elements.
-    fn count(&mut self, what: &str) -> Result<u64, VtkError> {
+    pub fn count(&mut self, what: &str) -> Result<u64, VtkError> {
         let Some(word) = self.text.word() else { return Err(self.ends(&format!("the number of {what}"))) };
         let number = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
         number.ok_or_else(|| self.syntax(format!("\"{}\" is no number of {what}", escape(word))))
     }
 
     /// A type, and the rest of its line.
-    fn kind(&mut self, what: &str) -> Result<Kind, VtkError> {
+    pub fn kind(&mut self, what: &str) -> Result<Kind, VtkError> {
+        let kind = self.kind_in_line(what)?;
+        self.end_of_line();
+        Ok(kind)
+    }
+
+    /// A type, which may not be the last word of its line.
+    pub fn kind_in_line(&mut self, what: &str) -> Result<Kind, VtkError> {
         let Some(word) = self.text.word() else { return Err(self.ends(&format!("the type of {what}"))) };
         let kind = match word.to_ascii_lowercase().as_slice() {
             b"bit" => Some(Kind::Bit),
@@ -85,9 +98,7 @@ impl<'a> Arrays<'a> {
             b"variant" => Some(Kind::Variant),
             other => Scalar::legacy(other).map(Kind::Number),
         };
-        let kind = kind.ok_or_else(|| self.syntax(format!("\"{}\" is no type of {what}", escape(word))))?;
-        self.end_of_line();
-        Ok(kind)
+        kind.ok_or_else(|| self.syntax(format!("\"{}\" is no type of {what}", escape(word))))
     }
 
     fn number_kind(&mut self, what: &str) -> Result<Scalar, VtkError> {
@@ -98,14 +109,14 @@ impl<'a> Arrays<'a> {
     }
 
     /// Binary numbers begin after the end of the line.
-    fn end_of_line(&mut self) {
+    pub fn end_of_line(&mut self) {
         if self.binary {
             self.text.line();
         }
     }
 
     /// The bytes of so many elements of a size.
-    fn bytes(&mut self, what: &str, count: u64, size: u64) -> Result<&'a [u8], VtkError> {
+    pub fn bytes(&mut self, what: &str, count: u64, size: u64) -> Result<&'a [u8], VtkError> {
         let rest = self.text.rest();
         let there = rest.len() as u64 / size;
         if count > there {
@@ -191,7 +202,7 @@ impl<'a> Arrays<'a> {
     }
 
     fn named(&mut self, name: &str, section: &str, count: u64) -> Result<Vec<u32>, VtkError> {
-        match self.keyword()? {
+        match self.keyword() {
             Some(word) if word == name.as_bytes() => {}
             Some(other) => return Err(self.unexpected(&other, name)),
             None => return Err(self.ends(name)),
@@ -201,51 +212,80 @@ impl<'a> Arrays<'a> {
         self.ids(&what, count, scalar)
     }
 
-    /// Passes over a field: named arrays that belong to no point or cell.
-    pub fn skip_field(&mut self) -> Result<(), VtkError> {
+    /// Passes over a field, and tells its arrays.
+    pub fn field(&mut self, mut tell: impl FnMut(Stored<'a>)) -> Result<(), VtkError> {
         self.text.word();
         let arrays = self.count("arrays")?;
         for _ in 0..arrays {
-            let Some(name) = self.keyword()? else { return Err(self.ends("an array of FIELD")) };
-            if name == b"NULL_ARRAY" {
+            let Some(name) = self.name() else { return Err(self.ends("an array of FIELD")) };
+            if name.eq_ignore_ascii_case(b"NULL_ARRAY") {
                 continue;
             }
             let (components, tuples) = (self.count("components")?, self.count("tuples")?);
             let kind = self.kind("an array of FIELD")?;
-            self.skip(&kind, components.saturating_mul(tuples))?;
+            let array = Stored { name, kind, components, tuples, at: self.text.at };
+            self.skip(&array, "FIELD")?;
+            tell(array);
         }
         Ok(())
     }
 
-    fn skip(&mut self, kind: &Kind, count: u64) -> Result<(), VtkError> {
-        let what = "an array of FIELD";
-        match kind {
+    /// Passes over the values of an array, of a section.
+    pub fn skip(&mut self, array: &Stored, section: &str) -> Result<(), VtkError> {
+        let what = &format!("an array of {section}");
+        let end = format!("the end of {section}");
+        let count = array.components.saturating_mul(array.tuples);
+        match array.kind {
             Kind::Number(scalar) if self.binary => self.bytes(what, count, scalar.bytes()).map(|_| ()),
             Kind::Bit if self.binary => self.bytes(what, count.div_ceil(8), 1).map(|_| ()),
-            Kind::String if self.binary => (0..count).try_for_each(|_| self.skip_string()),
             Kind::Number(_) | Kind::Bit => {
                 self.text.expect(what, count)?;
-                (0..count).try_for_each(|_| self.text.word().map(|_| ()).ok_or_else(|| self.ends("the end of FIELD")))
+                (0..count).try_for_each(|_| self.text.word().map(|_| ()).ok_or_else(|| self.ends(&end)))
             }
             Kind::String | Kind::Variant => {
-                if !self.binary {
-                    self.text.line();
-                }
-                (0..count).try_for_each(|_| self.text.line().map(|_| ()).ok_or_else(|| self.ends("the end of FIELD")))
+                self.begin_strings();
+                (0..count).try_for_each(|_| self.string(array.kind, section).map(|_| ()))
             }
         }
     }
 
+    /// Strings of text begin on the line behind their type.
+    pub fn begin_strings(&mut self) {
+        if !self.binary {
+            self.text.line();
+        }
+    }
+
+    /// The next string, or variant.
+    pub fn string(&mut self, kind: Kind, section: &str) -> Result<&'a [u8], VtkError> {
+        if self.binary && kind == Kind::String {
+            return self.binary_string(section);
+        }
+        self.text.line().ok_or_else(|| self.ends(&format!("the end of {section}")))
+    }
+
     /// A binary string begins with its length, whose first two bits tell how many bytes the length has.
-    fn skip_string(&mut self) -> Result<(), VtkError> {
-        let what = "a string of FIELD";
+    fn binary_string(&mut self, section: &str) -> Result<&'a [u8], VtkError> {
+        let what = &format!("a string of {section}");
         let first = self.text.rest().first().copied().ok_or_else(|| self.ends(what))?;
         let size = 8 >> (first >> 6);
         let length = self.bytes(what, 1, size)?.iter().fold(0_u64, |n, b| n << 8 | u64::from(*b));
         // Without the first two bits.
         let mask = u64::MAX >> (64 - 8 * size + 2);
-        self.bytes(what, length & mask, 1).map(|_| ())
+        self.bytes(what, length & mask, 1)
     }
+}
+
+/// An array of data, as it is declared, and where its values begin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stored<'a> {
+    /// As it is written.
+    pub name: &'a [u8],
+    pub kind: Kind,
+    pub components: u64,
+    pub tuples: u64,
+    /// Behind the type.
+    pub at: usize,
 }
 
 /// The layout before version 5: the number of corners of each cell before them.

@@ -1,14 +1,18 @@
 //! Files of VTK: legacy `.vtk`, and XML `.vtu` and `.vtp`.
 //!
 //! What a file is its first bytes tell, not its name. Everything that makes a surface is read, as triangles;
-//! vertices, lines and volumes are counted. Quadratic triangles and quadrilaterals give their corners: edges are
+//! vertices, lines and volumes are counted. One array of cells, of whole numbers or words, labels the triangles;
+//! one of points tells sizes, if it is asked for. Quadratic
+//! triangles and quadrilaterals give their corners: edges are
 //! taken to be straight. [`vtu`], [`vtp`] and [`vtm`] are what planish writes for ParaView.
 
+mod attributes;
 mod cell;
+mod cell_labels;
 mod error;
-pub mod layout;
 mod legacy;
 mod legacy_arrays;
+mod legacy_sizes;
 mod packed;
 mod read_back;
 mod scalar;
@@ -17,8 +21,12 @@ mod text;
 pub mod vtm;
 pub mod vtp;
 pub mod vtu;
+pub mod welded;
 mod xml;
+mod xml_labels;
 mod xml_outline;
+mod xml_parts;
+mod xml_sizes;
 #[cfg(test)]
 mod xml_tests;
 

@@ -5,8 +5,9 @@ use super::cell;
 use super::scalar::Scalar;
 use super::vtu::{Grid, Shape, VtuError};
 use super::xml::Arrays;
-use super::xml_outline::{Field, Piece, Role, Section, outline};
-use crate::formats::{Limits, NoSiblings, Source};
+use super::xml_outline::outline;
+use super::xml_parts::{Field, Piece, Role, Section, Wanted};
+use crate::formats::{Limits, Source};
 use planish_core::measure::distortion::CellFields;
 
 /// How every file of planish's begins; compressors came and went.
@@ -25,6 +26,9 @@ const FIELDS: [Field; 9] = [
     Field::OfCells("conformal_distortion"),
     Field::OfCells("area_scale"),
 ];
+
+/// The types of indices: unsigned in files of earlier versions. What is negative is too large for an index, read as unsigned.
+const INDICES: [Scalar; 2] = [Scalar::I64, Scalar::U64];
 
 /// The field that tells the charts of a surface.
 const CHART: [Field; 1] = [Field::OfCells("chart")];
@@ -54,8 +58,8 @@ fn columns<T>(
         return Err(VtuError::Content("the header"));
     }
     let limits = Limits::default();
-    let source = Source { bytes, limits: &limits, beside: &NoSiblings };
-    let file = outline(bytes, limits.depth, fields)?;
+    let source = Source::alone(bytes, &limits);
+    let file = outline(bytes, limits.depth, Wanted::Fields(fields))?;
     let [piece] = &file.pieces[..] else { return Err(VtuError::Content("Piece")) };
     if piece.twice.is_some() {
         return Err(VtuError::Content("an array"));
@@ -88,14 +92,14 @@ impl Columns<'_, '_> {
 
     /// The nodes of the cells, all of which must be 6-node triangles of existing points.
     fn cells(&mut self, points: u64, count: u64) -> Result<Vec<[u32; 6]>, VtuError> {
-        let types = self.numbers(Role::Types, "Cells", Scalar::U8, count, u8::from_le_bytes)?;
-        let ends = self.numbers(Role::Offsets(Section::Cells), "Cells", Scalar::U64, count, u64::from_le_bytes)?;
+        let types = self.numbers(Role::Types, "Cells", &[Scalar::U8], count, u8::from_le_bytes)?;
+        let ends = self.numbers(Role::Offsets(Section::Cells), "Cells", &INDICES, count, u64::from_le_bytes)?;
         let are_sixes = ends.into_iter().zip(1..).all(|(end, i)| end == 6 * i);
         let are_quadratic = types.into_iter().all(|kind| kind == cell::QUADRATIC_TRIANGLE);
         let Some(all) = count.checked_mul(6).filter(|_| are_sixes && are_quadratic) else {
             return Err(VtuError::Content("Cells"));
         };
-        let nodes = self.numbers(Role::Connectivity(Section::Cells), "Cells", Scalar::U64, all, node)?;
+        let nodes = self.numbers(Role::Connectivity(Section::Cells), "Cells", &INDICES, all, node)?;
         if nodes.iter().any(|node| u64::from(*node) >= points) {
             return Err(VtuError::Content("Cells"));
         }
@@ -130,24 +134,25 @@ impl Columns<'_, '_> {
         count: u64,
     ) -> Result<Vec<[f64; N]>, VtuError> {
         let numbers = count.checked_mul(N as u64).ok_or(VtuError::Content(name))?;
-        let numbers = self.numbers(role, name, Scalar::F64, numbers, f64::from_le_bytes)?;
+        let numbers = self.numbers(role, name, &[Scalar::F64], numbers, f64::from_le_bytes)?;
         Ok(numbers.as_chunks().0.to_vec())
     }
 
     fn integers(&mut self, field: Field, name: &'static str, count: u64) -> Result<Vec<i32>, VtuError> {
-        self.numbers(Role::Field(field), name, Scalar::I32, count, i32::from_le_bytes)
+        self.numbers(Role::Field(field), name, &[Scalar::I32], count, i32::from_le_bytes)
     }
 
-    /// Exactly so many numbers of a type, each made of its bytes by `number`.
+    /// Exactly so many numbers of one of these types, which have one size, each made of its bytes by `number`.
     fn numbers<const SIZE: usize, T>(
         &mut self,
         role: Role,
         name: &'static str,
-        scalar: Scalar,
+        scalars: &[Scalar],
         count: u64,
         number: impl Fn([u8; SIZE]) -> T,
     ) -> Result<Vec<T>, VtuError> {
-        let array = self.piece.array(role).filter(|array| array.scalar == scalar).ok_or(VtuError::Content(name))?;
+        let array =
+            self.piece.array(role).filter(|array| scalars.contains(&array.scalar)).ok_or(VtuError::Content(name))?;
         let bytes = self.arrays.bytes_of(&array, name)?;
         let (numbers, rest) = bytes.as_chunks::<SIZE>();
         if !rest.is_empty() || numbers.len() as u64 != count {

@@ -22,7 +22,7 @@ macro_rules! collected {
 }
 
 /// The first number of a type that is none from 0 to 2^32 - 1, or all of them as such.
-macro_rules! whole {
+macro_rules! ids {
     ($type:ty, $bytes:expr, $order:expr) => {{
         let numbers = $bytes.as_chunks::<{ size_of::<$type>() }>().0;
         let value = |b: [u8; size_of::<$type>()]| match $order {
@@ -49,16 +49,16 @@ impl Scalar {
     /// The type of this name in legacy files, in lower case. An id is stored there as an int.
     pub(super) fn legacy(name: &[u8]) -> Option<Self> {
         Some(match name {
-            b"char" | b"signed_char" => Self::I8,
-            b"unsigned_char" => Self::U8,
-            b"short" => Self::I16,
-            b"unsigned_short" => Self::U16,
-            b"int" | b"vtkidtype" => Self::I32,
-            b"unsigned_int" => Self::U32,
+            b"char" | b"signed_char" | b"vtktypeint8" => Self::I8,
+            b"unsigned_char" | b"vtktypeuint8" => Self::U8,
+            b"short" | b"vtktypeint16" => Self::I16,
+            b"unsigned_short" | b"vtktypeuint16" => Self::U16,
+            b"int" | b"vtkidtype" | b"vtktypeint32" => Self::I32,
+            b"unsigned_int" | b"vtktypeuint32" => Self::U32,
             b"long" | b"vtktypeint64" => Self::I64,
             b"unsigned_long" | b"vtktypeuint64" => Self::U64,
-            b"float" => Self::F32,
-            b"double" => Self::F64,
+            b"float" | b"vtktypefloat32" => Self::F32,
+            b"double" | b"vtktypefloat64" => Self::F64,
             _ => return None,
         })
     }
@@ -109,15 +109,66 @@ impl Scalar {
     /// Whole numbers; bytes that make none are left out. Floating point numbers are no ids.
     pub(super) fn ids(self, bytes: &[u8], order: Order) -> Result<Vec<u32>, BadId> {
         match self {
-            Self::I8 => whole!(i8, bytes, order),
-            Self::U8 => whole!(u8, bytes, order),
-            Self::I16 => whole!(i16, bytes, order),
-            Self::U16 => whole!(u16, bytes, order),
-            Self::I32 => whole!(i32, bytes, order),
-            Self::U32 => whole!(u32, bytes, order),
-            Self::I64 => whole!(i64, bytes, order),
-            Self::U64 => whole!(u64, bytes, order),
+            Self::I8 => ids!(i8, bytes, order),
+            Self::U8 => ids!(u8, bytes, order),
+            Self::I16 => ids!(i16, bytes, order),
+            Self::U16 => ids!(u16, bytes, order),
+            Self::I32 => ids!(i32, bytes, order),
+            Self::U32 => ids!(u32, bytes, order),
+            Self::I64 => ids!(i64, bytes, order),
+            Self::U64 => ids!(u64, bytes, order),
             Self::F32 | Self::F64 => Err(BadId { entry: 0, value: "of floating point".to_owned() }),
+        }
+    }
+
+    /// What `each` makes of numbers of a whole type, and of the whole parts of others; bytes that make none are left out.
+    pub(super) fn whole<T>(self, bytes: &[u8], order: Order, mut each: impl FnMut(i128) -> T) -> Vec<T> {
+        macro_rules! whole {
+            ($type:ty) => {
+                collected!($type, 1, bytes, order, |[n]: [$type; 1]| each(n as i128))
+            };
+        }
+        match self {
+            Self::I8 => whole!(i8),
+            Self::U8 => whole!(u8),
+            Self::I16 => whole!(i16),
+            Self::U16 => whole!(u16),
+            Self::I32 => whole!(i32),
+            Self::U32 => whole!(u32),
+            Self::I64 => whole!(i64),
+            Self::U64 => whole!(u64),
+            Self::F32 => whole!(f32),
+            Self::F64 => whole!(f64),
+        }
+    }
+
+    /// Numbers of whatever type; bytes that make none are left out.
+    pub(super) fn numbers(self, bytes: &[u8], order: Order) -> Vec<f64> {
+        macro_rules! numbers {
+            ($type:ty) => {
+                collected!($type, 1, bytes, order, |[n]: [$type; 1]| n as f64)
+            };
+        }
+        match self {
+            Self::I8 => numbers!(i8),
+            Self::U8 => numbers!(u8),
+            Self::I16 => numbers!(i16),
+            Self::U16 => numbers!(u16),
+            Self::I32 => numbers!(i32),
+            Self::U32 => numbers!(u32),
+            Self::I64 => numbers!(i64),
+            Self::U64 => numbers!(u64),
+            Self::F32 => numbers!(f32),
+            Self::F64 => numbers!(f64),
+        }
+    }
+
+    /// Floating-point numbers, of which there are none where the type is another.
+    pub(super) fn floats(self, bytes: &[u8], order: Order) -> Vec<f64> {
+        match self {
+            Self::F32 => collected!(f32, 1, bytes, order, |[n]: [f32; 1]| f64::from(n)),
+            Self::F64 => collected!(f64, 1, bytes, order, |[n]: [f64; 1]| n),
+            _ => Vec::new(),
         }
     }
 }

@@ -1,8 +1,10 @@
 //! The surface as it grows, piece by piece and cell by cell.
 
 use super::cell::{self, Kind};
+use super::cell_labels::{PieceCells, Rank};
 use super::error::{Location, VtkError};
 use crate::formats::finish::{self, BadPoints};
+use crate::formats::labels::Labels;
 use crate::formats::{Content, Limits, Notes, ReadError, polygon};
 use planish_core::vec3::Vec3;
 
@@ -25,6 +27,16 @@ pub(super) struct Cells<'a> {
     pub ends: &'a [u32],
 }
 
+impl Cells<'_> {
+    fn rank(&self) -> Rank {
+        match self.types {
+            Types::All(cell::STRIP) => Rank::Strips,
+            Types::All(_) => Rank::Polygons,
+            Types::Each(_) => Rank::First,
+        }
+    }
+}
+
 /// Points and triangles so far.
 pub(super) struct Surface<'a> {
     limits: &'a Limits,
@@ -39,10 +51,13 @@ pub(super) struct Surface<'a> {
     skipped: [usize; 256],
     /// Corners of the cell at hand, counted from the first point of the file.
     scratch: Vec<u32>,
+    /// The cells of the piece at hand, where their triangles are to be found.
+    cells: Option<PieceCells>,
 }
 
 impl<'a> Surface<'a> {
-    pub fn new(limits: &'a Limits, format: String) -> Self {
+    /// Nothing, of a file of this format. Triangles are told by cells afterwards, if `is_labelled` says so.
+    pub fn new(limits: &'a Limits, format: String, is_labelled: bool) -> Self {
         Self {
             limits,
             notes: Notes::new(format),
@@ -52,7 +67,13 @@ impl<'a> Surface<'a> {
             mid_nodes: Vec::new(),
             skipped: [0; 256],
             scratch: Vec::new(),
+            cells: is_labelled.then(PieceCells::default),
         }
+    }
+
+    /// How many points there are.
+    pub fn points(&self) -> u64 {
+        self.points.len() as u64
     }
 
     /// How many points there may be.
@@ -81,9 +102,22 @@ impl<'a> Surface<'a> {
         Ok(())
     }
 
-    /// Counts elements that are left out.
-    pub fn skip(&mut self, what: &str, count: usize) {
-        self.notes.skip(what, count);
+    /// Counts vertices or lines, which are left out.
+    pub fn skip(&mut self, rank: Rank, count: usize) {
+        self.notes.skip(if rank == Rank::Lines { "lines" } else { "vertices" }, count);
+        if let Some(cells) = &mut self.cells {
+            cells.skip(rank, count);
+        }
+    }
+
+    /// The cells of the piece at hand, which is at its end; none where they are not asked for.
+    pub fn take_cells(&mut self) -> Option<PieceCells> {
+        self.cells.as_mut().map(std::mem::take)
+    }
+
+    /// What else there is to tell.
+    pub fn notes(&mut self) -> &mut Notes {
+        &mut self.notes
     }
 
     /// Adds the triangles of cells of the piece at hand.
@@ -92,6 +126,8 @@ impl<'a> Surface<'a> {
         if !matches!(cells.types, Types::All(cell::STRIP)) {
             self.triangles.reserve(cells.ends.len().min(cells.corners.len() / 3));
         }
+        let begin = self.triangles.len();
+        let mut triangles = Vec::with_capacity(if self.cells.is_some() { cells.ends.len() } else { 0 });
         let mut start = 0;
         for (cell, end) in cells.ends.iter().enumerate() {
             let Some(corners) = cells.corners.get(start..*end as usize) else {
@@ -107,7 +143,13 @@ impl<'a> Surface<'a> {
                 let (declared, limit) = (self.triangles.len() as u64, self.limits.elements);
                 return Err(VtkError::TooLarge { location: location(), what: "triangles", declared, limit });
             }
+            if self.cells.is_some() {
+                triangles.push(self.triangles.len() as u32);
+            }
             start = *end as usize;
+        }
+        if let Some(piece) = &mut self.cells {
+            piece.add(cells.rank(), begin, triangles);
         }
         Ok(())
     }
@@ -178,13 +220,13 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// The surface, if there is any.
-    pub fn finish(mut self) -> Result<Content, ReadError> {
+    /// The surface with its labels, if there is any.
+    pub fn finish(mut self, labels: Labels) -> Result<Content, ReadError> {
         for (cell_type, count) in (0..=255).zip(self.skipped) {
             self.notes.skip(cell::name(cell_type), count);
         }
         self.notes.mid_nodes = self.mid_nodes.iter().filter(|mid| **mid).count();
-        finish::content(self.points, self.triangles, self.notes, &BadPoints::default())
+        finish::content(self.points, self.triangles, labels, self.notes, &BadPoints::default())
     }
 }
 
@@ -206,19 +248,20 @@ impl BadCell {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::LabelSource;
 
     const SQUARE: [Vec3; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
 
     fn add(cell_type: u8, corners: &[u32]) -> Result<Content, ReadError> {
         let limits = Limits::default();
-        let mut surface = Surface::new(&limits, "VTK".to_owned());
+        let mut surface = Surface::new(&limits, "VTK".to_owned(), false);
         // A piece of its own comes first: cells count from the second.
         for _ in 0..2 {
             surface.add_points([SQUARE, SQUARE, SQUARE].concat(), || Location::Line(1))?;
         }
         let (types, ends) = (Types::All(cell_type), [corners.len() as u32]);
         surface.add_cells(&Cells { section: "CELLS", types, corners, ends: &ends }, || Location::Line(2))?;
-        surface.finish()
+        surface.finish(Labels::new(&LabelSource::Ignored))
     }
 
     fn triangles(cell_type: u8, corners: &[u32]) -> Vec<[u32; 3]> {
@@ -278,7 +321,7 @@ mod tests {
     fn offsets_must_rise_and_end_in_range() {
         let limits = Limits { elements: 5, ..Limits::default() };
         for ends in [&[3, 2, 6][..], &[3, 7], &[7]] {
-            let mut surface = Surface::new(&limits, "VTK".to_owned());
+            let mut surface = Surface::new(&limits, "VTK".to_owned(), false);
             surface.add_points(SQUARE.to_vec(), || Location::Line(1)).expect("few");
             let cells = Cells { section: "Polys", types: Types::All(7), corners: &[0, 1, 2, 2, 1, 3], ends };
             assert!(
@@ -291,7 +334,7 @@ mod tests {
     #[test]
     fn limits_hold_for_all_pieces_together() {
         let limits = Limits { elements: 5, ..Limits::default() };
-        let mut surface = Surface::new(&limits, "VTK".to_owned());
+        let mut surface = Surface::new(&limits, "VTK".to_owned(), false);
         surface.add_points(SQUARE.to_vec(), || Location::Line(1)).expect("few");
         let corners: Vec<u32> = [0, 1, 2].repeat(6);
         let cells = Cells { section: "Polys", types: Types::All(7), corners: &corners, ends: &[3, 6, 9, 12, 15, 18] };

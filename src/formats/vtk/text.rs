@@ -40,6 +40,15 @@ impl<'a> Text<'a> {
         (!word.is_empty()).then_some(word)
     }
 
+    /// How many words are left.
+    pub fn words(mut self) -> u64 {
+        let mut words = 0;
+        while self.word().is_some() {
+            words += 1;
+        }
+        words
+    }
+
     /// The rest of the line, without its end; none at the end of the text.
     pub fn line(&mut self) -> Option<&'a [u8]> {
         let rest = self.rest();
@@ -89,7 +98,29 @@ impl<'a> Text<'a> {
         Ok(ids)
     }
 
+    /// This many values of an array, each of a word.
+    pub fn values<T>(
+        &mut self,
+        what: &str,
+        count: u64,
+        mut value: impl FnMut(&[u8]) -> Option<T>,
+    ) -> Result<Vec<T>, VtkError> {
+        self.expect(what, count)?;
+        let mut values = Vec::with_capacity(count as usize);
+        for there in 0..count {
+            let Some(word) = self.word() else { return Err(self.count(what, count, there)) };
+            let bad = || self.syntax(format!("\"{}\" is no value of {what}", escape(word)));
+            values.push(value(word).ok_or_else(bad)?);
+        }
+        Ok(values)
+    }
+
     fn count(&self, what: &str, declared: u64, there: u64) -> VtkError {
         VtkError::Count { location: self.location(), what: what.to_owned(), declared, there }
     }
+}
+
+/// The whole number that a word is, of whatever type.
+pub(super) fn whole(word: &[u8]) -> Option<i128> {
+    std::str::from_utf8(word).ok()?.parse().ok()
 }

@@ -1,8 +1,10 @@
 //! `seams.vtp`: the curves between charts as polylines, and corners as points, by `vtkio`.
 
-use super::vtu::COMPRESSOR;
+use super::vtu::{COMPRESSOR, sign_indices, tag_of};
+use crate::formats::Label;
+use planish_core::CertifiedAtlas;
 use planish_core::mesh::SurfaceMesh;
-use planish_core::seams::{Curve, SeamNetwork};
+use planish_core::seams::Curve;
 use planish_core::topology::VertexId;
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version, VertexNumbers, Vtk,
@@ -17,11 +19,13 @@ pub struct VtpError(String);
 /// vertex cell per corner.
 ///
 /// Points: `vertex`, the input vertex. Cells: `curve` (-1 for corners), `open` (1 where one chart lies beside it),
-/// `sides` (how many do), `chart_a` and `chart_b` (the first two of them, -1 for none), `length`.
+/// `sides` (how many do), `chart_a` and `chart_b` (the first two of them, -1 for none), `length`; where there are labels,
+/// `label_a` and `label_b`, the tags of those of these charts.
 ///
 /// # Errors
 /// [`VtpError`].
-pub fn seams(mesh: &SurfaceMesh, network: &SeamNetwork) -> Result<Vec<u8>, VtpError> {
+pub fn seams(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Vec<u8>, VtpError> {
+    let (mesh, network) = (atlas.mesh(), atlas.seams());
     // The corners, each once; then the vertices of one curve after the other, shared by none.
     let mut vertices: Vec<VertexId> = network.points().iter().filter(|p| p.corner).map(|p| p.vertex).collect();
     let corners = vertices.len();
@@ -36,7 +40,7 @@ pub fn seams(mesh: &SurfaceMesh, network: &SeamNetwork) -> Result<Vec<u8>, VtpEr
         points: points.into(),
         verts: (corners > 0).then(|| consecutive(0, &vec![1; corners])),
         lines: Some(consecutive(corners, &lengths)),
-        data: Attributes { point: vec![array("vertex", numbers)], cell: cell_fields(network, corners) },
+        data: Attributes { point: vec![array("vertex", numbers)], cell: cell_fields(atlas, corners, labels) },
         ..PolyDataPiece::default()
     };
     let vtk = Vtk {
@@ -49,6 +53,7 @@ pub fn seams(mesh: &SurfaceMesh, network: &SeamNetwork) -> Result<Vec<u8>, VtpEr
     let mut bytes = Vec::new();
     let file = vtk.try_into_xml_format(COMPRESSOR, 1).map_err(|e| VtpError(e.to_string()))?;
     file.write(&mut bytes).map_err(|e| VtpError(e.to_string()))?;
+    sign_indices(&mut bytes);
     Ok(bytes)
 }
 
@@ -74,16 +79,22 @@ fn array(name: &str, data: impl Into<IOBuffer>) -> Attribute {
 }
 
 /// The fields of the corners, then those of the curves: the order of the cells in PolyData.
-fn cell_fields(network: &SeamNetwork, corners: usize) -> Vec<Attribute> {
-    let curves = network.curves();
-    vec![
+fn cell_fields(atlas: &CertifiedAtlas, corners: usize, labels: &[Label]) -> Vec<Attribute> {
+    let curves = atlas.seams().curves();
+    let mut arrays = vec![
         array("curve", column(-1, corners, curves, |c| c.id().0 as i32)),
         array("open", column(0, corners, curves, |c| i32::from(c.is_open()))),
         array("sides", column(0, corners, curves, |c| c.sides().len() as i32)),
         array("chart_a", column(-1, corners, curves, |c| chart_beside(c, 0))),
         array("chart_b", column(-1, corners, curves, |c| chart_beside(c, 1))),
         array("length", column(0.0, corners, curves, Curve::length)),
-    ]
+    ];
+    if !labels.is_empty() {
+        let beside = |c: &Curve, side: usize| c.sides().get(side).map_or(-1, |side| tag_of(atlas, side.chart, labels));
+        arrays.push(array("label_a", column(-1, corners, curves, |c| beside(c, 0))));
+        arrays.push(array("label_b", column(-1, corners, curves, |c| beside(c, 1))));
+    }
+    arrays
 }
 
 /// A field: the same value at every corner, then one value per curve.

@@ -1,12 +1,18 @@
 //! VTK XML files: `.vtu` and `.vtp`, in every encoding.
 
+use super::cell_labels::{PieceCells, Rank};
 use super::error::{Location, VtkError};
 use super::packed::{Budget, Compressor, Packing, Stream, unpack};
 use super::scalar::Order;
 use super::surface::{Cells, Surface, Types};
 use super::text::Text;
-use super::xml_outline::{Appended, Array, Data, Outline, Piece, Role, Section, outline};
-use crate::formats::{Content, ReadError, Source};
+use super::xml_labels;
+use super::xml_outline::outline;
+use super::xml_parts::{Appended, Array, Data, Outline, Piece, Role, Section, Wanted};
+use super::xml_sizes;
+use crate::formats::labels::Labels;
+use crate::formats::point_sizes;
+use crate::formats::{Content, LabelSource, ReadError, Source};
 use planish_core::vec3::Vec3;
 use std::borrow::Cow;
 
@@ -14,13 +20,24 @@ use std::borrow::Cow;
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let readable = readable(source.bytes);
     let source = &Source { bytes: &readable, ..*source };
-    let file = outline(source.bytes, source.limits.depth, &[])?;
-    let mut surface = Surface::new(source.limits, format(&file));
+    let is_labelled = *source.labels != LabelSource::Ignored;
+    let wanted = Wanted::Arrays { of_cells: is_labelled, of_points: source.sizes.is_some() };
+    let file = outline(source.bytes, source.limits.depth, wanted)?;
+    let mut surface = Surface::new(source.limits, format(&file), is_labelled);
     let mut arrays = Arrays::new(source, &file);
+    let mut cells: Vec<PieceCells> = Vec::new();
     for piece in &file.pieces {
         arrays.piece(piece, &mut surface)?;
+        cells.extend(surface.take_cells());
     }
-    surface.finish()
+    // After the geometry: what labels take of the budget is not missing there.
+    let labels = match is_labelled {
+        true => xml_labels::labels(&mut arrays, &file, &cells, source.labels, surface.notes())?,
+        false => Labels::new(source.labels),
+    };
+    let content = surface.finish(labels)?;
+    let sizes = source.sizes.map(|asked| xml_sizes::sizes(&mut arrays, &file, asked)).transpose()?;
+    Ok(point_sizes::give(content, sizes))
 }
 
 /// A file that says to be in an encoding of one byte per letter, with another letter for each that is not ASCII: only
@@ -96,8 +113,8 @@ impl<'a> Arrays<'a> {
         for (section, count) in Section::ALL.into_iter().zip(piece.cells) {
             match section {
                 _ if count == 0 => {}
-                Section::Verts => surface.skip("vertices", count as usize),
-                Section::Lines => surface.skip("lines", count as usize),
+                Section::Verts => surface.skip(Rank::First, count as usize),
+                Section::Lines => surface.skip(Rank::Lines, count as usize),
                 Section::Cells | Section::Strips | Section::Polys => self.cells(piece, section, count, surface)?,
             }
         }
@@ -164,7 +181,7 @@ impl<'a> Arrays<'a> {
     }
 
     /// The bytes of the first numbers of an array, as many as are `declared`.
-    fn first<'b>(&self, array: &Array, name: &str, declared: u64, bytes: &'b [u8]) -> Result<&'b [u8], VtkError> {
+    pub fn first<'b>(&self, array: &Array, name: &str, declared: u64, bytes: &'b [u8]) -> Result<&'b [u8], VtkError> {
         let there = bytes.len() as u64 / array.scalar.bytes();
         if declared > there {
             return Err(VtkError::Count { location: self.location(array), what: name.to_owned(), declared, there });
@@ -173,8 +190,13 @@ impl<'a> Arrays<'a> {
         Ok(&bytes[..(declared * array.scalar.bytes()) as usize])
     }
 
+    /// In which order the bytes of numbers stand.
+    pub fn order(&self) -> Order {
+        self.packing.order
+    }
+
     /// Where the numbers of an array begin.
-    fn location(&self, array: &Array) -> Location {
+    pub fn location(&self, array: &Array) -> Location {
         match (array.data, self.appended) {
             (Data::Appended(offset), Some(appended)) => Location::Byte(appended.at.saturating_add(offset as usize)),
             _ => Location::line_of(self.bytes, array.at),

@@ -2,133 +2,13 @@
 //!
 //! Only tags are looked at, one after the other. Appended data end the search: raw ones are no XML.
 
-use super::cell;
 use super::error::{Location, VtkError, escape};
 use super::packed::{Compressor, Packing};
 use super::scalar::{Order, Scalar};
 use super::unsupported;
+use super::xml_parts::{Appended, Array, Data, Field, Named, Outline, Owner, Piece, Role, Section, Wanted};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
-
-/// What an XML file is made of.
-pub(super) struct Outline<'a> {
-    /// `VTU` or `VTP`.
-    pub kind: &'static str,
-    pub packing: Packing,
-    pub pieces: Vec<Piece<'a>>,
-    pub appended: Option<Appended<'a>>,
-}
-
-/// Points and cells that belong together.
-#[derive(Default)]
-pub(super) struct Piece<'a> {
-    /// The byte after its tag.
-    pub at: usize,
-    pub points: u64,
-    /// How many cells each section has, in the order of [`Section::ALL`].
-    pub cells: [u64; 5],
-    pub arrays: Vec<(Role, Array<'a>)>,
-    /// What there is more than one array for, if anything: the first one counts.
-    pub twice: Option<Role>,
-}
-
-/// Where cells are listed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Section {
-    Cells,
-    Verts,
-    Lines,
-    Strips,
-    Polys,
-}
-
-impl Section {
-    pub const ALL: [Self; 5] = [Self::Cells, Self::Verts, Self::Lines, Self::Strips, Self::Polys];
-
-    /// The name of its element, and of the attribute of a piece that counts it.
-    fn names(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Cells => ("Cells", "NumberOfCells"),
-            Self::Verts => ("Verts", "NumberOfVerts"),
-            Self::Lines => ("Lines", "NumberOfLines"),
-            Self::Strips => ("Strips", "NumberOfStrips"),
-            Self::Polys => ("Polys", "NumberOfPolys"),
-        }
-    }
-
-    pub fn name(self) -> &'static str {
-        self.names().0
-    }
-
-    /// The type of all its cells, where they have one and belong to a surface.
-    pub fn cell_type(self) -> Option<u8> {
-        match self {
-            Self::Strips => Some(cell::STRIP),
-            Self::Polys => Some(cell::POLYGON),
-            Self::Cells | Self::Verts | Self::Lines => None,
-        }
-    }
-}
-
-/// What an array is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Role {
-    Points,
-    Connectivity(Section),
-    Offsets(Section),
-    Types,
-    Field(Field),
-}
-
-/// Values at points or cells, by their name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Field {
-    OfPoints(&'static str),
-    OfCells(&'static str),
-}
-
-impl Role {
-    pub fn name(self) -> String {
-        match self {
-            Self::Points => "Points".to_owned(),
-            Self::Connectivity(section) => format!("connectivity of {}", section.name()),
-            Self::Offsets(section) => format!("offsets of {}", section.name()),
-            Self::Types => "types of Cells".to_owned(),
-            Self::Field(Field::OfPoints(name) | Field::OfCells(name)) => format!("values of \"{name}\""),
-        }
-    }
-}
-
-/// An array as it stands in the file.
-#[derive(Clone, Copy)]
-pub(super) struct Array<'a> {
-    /// The byte after its tag.
-    pub at: usize,
-    pub scalar: Scalar,
-    /// How many numbers make an entry, if it is told.
-    pub components: Option<u64>,
-    pub data: Data<'a>,
-}
-
-/// Where the numbers of an array are.
-#[derive(Clone, Copy)]
-pub(super) enum Data<'a> {
-    /// As text in the element: the file up to the end of it, and where it begins.
-    Ascii(&'a [u8], usize),
-    /// As base64 in the element.
-    Inline(&'a [u8]),
-    /// From this byte of the appended data on.
-    Appended(u64),
-}
-
-/// The data behind the `_` of `AppendedData`.
-#[derive(Clone, Copy)]
-pub(super) struct Appended<'a> {
-    /// Where they begin in the file.
-    pub at: usize,
-    pub bytes: &'a [u8],
-    pub base64: bool,
-}
 
 /// The elements that matter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,14 +19,17 @@ enum Tag {
     Points,
     PointData,
     CellData,
+    FieldData,
     Section(Section),
     Array,
+    /// An array that has a name of its own.
+    Named,
     Other,
 }
 
-/// Finds what is in a file: the surface, and these fields.
-pub(super) fn outline<'a>(bytes: &'a [u8], depth: usize, fields: &'static [Field]) -> Result<Outline<'a>, VtkError> {
-    let mut search = Search::new(bytes, depth, fields);
+/// Finds what is in a file: the surface, and what else is wanted.
+pub(super) fn outline(bytes: &[u8], depth: usize, wanted: Wanted) -> Result<Outline<'_>, VtkError> {
+    let mut search = Search::new(bytes, depth, wanted);
     while search.step()? {}
     search.finish()
 }
@@ -155,7 +38,7 @@ pub(super) fn outline<'a>(bytes: &'a [u8], depth: usize, fields: &'static [Field
 struct Search<'a> {
     bytes: &'a [u8],
     depth: usize,
-    fields: &'static [Field],
+    wanted: Wanted,
     reader: Reader<&'a [u8]>,
     /// The elements around the place at hand, from the outermost.
     path: Vec<Tag>,
@@ -163,18 +46,29 @@ struct Search<'a> {
     kind: Option<(&'static str, &'static str)>,
     packing: Packing,
     pieces: Vec<Piece<'a>>,
+    named: Vec<Named<'a>>,
     /// Whether there was a piece with nothing in it.
     has_empty: bool,
     appended: Option<Appended<'a>>,
 }
 
 impl<'a> Search<'a> {
-    fn new(bytes: &'a [u8], depth: usize, fields: &'static [Field]) -> Self {
+    fn new(bytes: &'a [u8], depth: usize, wanted: Wanted) -> Self {
         let mut reader = Reader::from_reader(bytes);
         reader.config_mut().expand_empty_elements = true;
-        let packing = Packing { order: Order::Little, wide: false, compressor: None };
-        let (path, pieces) = (Vec::new(), Vec::new());
-        Self { bytes, depth, fields, reader, path, kind: None, packing, pieces, has_empty: false, appended: None }
+        Self {
+            bytes,
+            depth,
+            wanted,
+            reader,
+            path: Vec::new(),
+            kind: None,
+            packing: Packing { order: Order::Little, wide: false, compressor: None },
+            pieces: Vec::new(),
+            named: Vec::new(),
+            has_empty: false,
+            appended: None,
+        }
     }
 
     /// The byte after what was read last.
@@ -235,11 +129,14 @@ impl<'a> Search<'a> {
                 self.piece(tag)?;
                 Tag::Piece
             }
+            ([Tag::File, Tag::DataSet], "FieldData") => Tag::FieldData,
             ([.., Tag::Piece], name) => part(name),
-            ([.., parent], "DataArray") => match role(*parent, tag, self.fields) {
-                Some(role) => self.array(tag, role)?,
-                None => Tag::Other,
+            ([.., parent], "DataArray") => match (role(*parent, tag, self.wanted.fields()), self.wanted) {
+                (Some(role), _) => self.array(tag, role)?,
+                (None, _) => self.named(tag, *parent),
             },
+            // Strings.
+            ([.., parent], "Array") => self.named(tag, *parent),
             _ => Tag::Other,
         };
         self.path.push(opened);
@@ -299,17 +196,7 @@ impl<'a> Search<'a> {
         let Some(scalar) = Scalar::xml(scalar) else {
             return Err(self.syntax(format!("\"{}\" is no type of {}", escape(scalar.as_bytes()), role.name())));
         };
-        let data = match attribute(tag, "format").unwrap_or("ascii") {
-            "ascii" => Data::Ascii(&self.bytes[..self.at()], self.at()),
-            "binary" => Data::Inline(&[]),
-            "appended" => match self.number(tag, "offset")? {
-                Some(offset) => Data::Appended(offset),
-                None => return Err(self.syntax(format!("{} have no offset", role.name()))),
-            },
-            other => return Err(self.syntax(format!("\"{}\" is no format of an array", escape(other.as_bytes())))),
-        };
-        let components = self.number(tag, "NumberOfComponents")?;
-        let array = Array { at: self.at(), scalar, components, data };
+        let array = self.stored(tag, scalar, &role.name())?;
         match self.pieces.last_mut() {
             Some(piece) if piece.array(role).is_none() => piece.arrays.push((role, array)),
             Some(piece) => {
@@ -321,24 +208,73 @@ impl<'a> Search<'a> {
         Ok(Tag::Array)
     }
 
+    /// An array as its tag says that it is stored.
+    fn stored(&self, tag: &BytesStart, scalar: Scalar, name: &str) -> Result<Array<'a>, VtkError> {
+        let data = match attribute(tag, "format").unwrap_or("ascii") {
+            "ascii" => Data::Ascii(&self.bytes[..self.at()], self.at()),
+            "binary" => Data::Inline(&[]),
+            "appended" => match self.number(tag, "offset")? {
+                Some(offset) => Data::Appended(offset),
+                None => return Err(self.syntax(format!("{name} have no offset"))),
+            },
+            other => return Err(self.syntax(format!("\"{}\" is no format of an array", escape(other.as_bytes())))),
+        };
+        let components = self.number(tag, "NumberOfComponents")?;
+        Ok(Array { at: self.at(), scalar, components, data })
+    }
+
+    /// What an array in this element belongs to; none where arrays of that sort are not wanted.
+    fn owner(&self, parent: Tag) -> Option<Owner> {
+        let Wanted::Arrays { of_cells, of_points } = self.wanted else { return None };
+        let piece = self.pieces.len().checked_sub(1);
+        match parent {
+            Tag::FieldData if of_cells => Some(Owner::File),
+            Tag::CellData if of_cells => piece.map(Owner::Cells),
+            Tag::PointData if of_points => piece.map(Owner::Points),
+            _ => None,
+        }
+    }
+
+    /// An array that could label cells, name labels, or tell sizes. What is wrong with it matters where it is chosen only.
+    fn named(&mut self, tag: &BytesStart, parent: Tag) -> Tag {
+        let Some(owner) = self.owner(parent) else { return Tag::Other };
+        let is_of_points = matches!(owner, Owner::Points(_));
+        let name = attribute(tag, "Name").unwrap_or_default();
+        let name = quick_xml::escape::unescape(name).unwrap_or(name.into()).into_owned();
+        let kind = attribute(tag, "type").unwrap_or_default();
+        let is_strings = kind == "String";
+        let scalar = if is_strings { Some(Scalar::U8) } else { Scalar::xml(kind) };
+        let Some(scalar) = scalar.filter(|_| !(is_strings && is_of_points)) else { return Tag::Other };
+        let array = self.stored(tag, scalar, &Role::values_of(&name));
+        let has_several = array.as_ref().is_ok_and(|array| array.components.is_some_and(|components| components > 1));
+        // Which array tells sizes is asked for by name: one of several components is told to be one.
+        if has_several && !is_of_points {
+            return Tag::Other;
+        }
+        self.named.push(Named { name, owner, is_strings, array });
+        Tag::Named
+    }
+
     /// Text from this byte on: the numbers of an array, perhaps.
     fn text(&mut self, from: usize) -> Result<(), VtkError> {
-        let text = &self.bytes[from..self.at()];
-        if self.path.last() != Some(&Tag::Array) || text.trim_ascii().is_empty() {
+        let end = self.at();
+        if self.bytes[from..end].trim_ascii().is_empty() {
             return Ok(());
         }
-        let (bytes, end) = (self.bytes, self.at());
-        let Some((_, array)) = self.pieces.last_mut().and_then(|p| p.arrays.last_mut()) else { return Ok(()) };
-        let fresh = match &mut array.data {
-            Data::Ascii(until, at) => {
-                let fresh = until.len() == *at;
-                (*until, *at) = (&bytes[..end], from);
-                fresh
-            }
-            Data::Inline(data) => std::mem::replace(data, text).is_empty(),
-            Data::Appended(_) => true,
+        let array = match self.path.last() {
+            Some(Tag::Array) => self.pieces.last_mut().and_then(|piece| Some(&mut piece.arrays.last_mut()?.1)),
+            Some(Tag::Named) => self.named.last_mut().and_then(|named| named.array.as_mut().ok()),
+            _ => None,
         };
-        if fresh { Ok(()) } else { Err(self.syntax("the numbers of an array are interrupted")) }
+        if array.is_none_or(|array| array.data.hold(self.bytes, from, end)) {
+            return Ok(());
+        }
+        let interrupted = self.syntax("the numbers of an array are interrupted");
+        match self.named.last_mut() {
+            Some(named) if self.path.last() == Some(&Tag::Named) => named.array = Err(interrupted),
+            _ => return Err(interrupted),
+        }
+        Ok(())
     }
 
     /// An element ends.
@@ -350,6 +286,10 @@ impl<'a> Search<'a> {
         if piece.points == 0 && piece.cells.iter().all(|count| *count == 0) {
             // Nothing is in it; many of them should take no memory.
             self.pieces.pop();
+            let piece = Some(self.pieces.len());
+            while self.named.last().is_some_and(|named| named.owner.piece() == piece) {
+                self.named.pop();
+            }
             self.has_empty = true;
         } else if piece.points > 0 && piece.array(Role::Points).is_none() {
             return Err(self.count("Points of this piece".to_owned(), piece.points));
@@ -382,14 +322,16 @@ impl<'a> Search<'a> {
         if self.pieces.is_empty() && !self.has_empty {
             return Err(self.syntax("there is no <Piece> in the file"));
         }
-        Ok(Outline { kind, packing: self.packing, pieces: self.pieces, appended: self.appended })
-    }
-}
-
-impl<'a> Piece<'a> {
-    /// The array for this.
-    pub fn array(&self, role: Role) -> Option<Array<'a>> {
-        self.arrays.iter().find(|(r, _)| *r == role).map(|(_, array)| *array)
+        let (packing, pieces, appended) = (self.packing, self.pieces, self.appended);
+        let [mut of_cells, mut of_file, mut of_points] = [const { Vec::new() }; 3];
+        for named in self.named {
+            match named.owner {
+                Owner::File => of_file.push(named),
+                Owner::Cells(_) => of_cells.push(named),
+                Owner::Points(_) => of_points.push(named),
+            }
+        }
+        Ok(Outline { kind, packing, pieces, of_cells, of_file, of_points, appended })
     }
 }
 

@@ -177,6 +177,40 @@ impl File {
         self.text(&format!("<DataArray format=\"{format}\" {more} type=\"{kind}\" Name='{name}'>{text}</DataArray>\n"))
     }
 
+    /// An array of strings.
+    fn strings(self, name: &str, strings: &[&str]) -> Self {
+        let bytes: Vec<u8> = strings.iter().flat_map(|string| [string.as_bytes(), b"\0"].concat()).collect();
+        let before = self.xml.len();
+        let mut file = self.array("String", name, "", &bytes, u8::to_be_bytes);
+        let array = file.xml.split_off(before).replace("DataArray", "Array");
+        file.text(&array)
+    }
+
+    /// Arrays of cells with these values, as numbers of every type, and as strings.
+    fn cell_data(self, values: &[u8]) -> Self {
+        let words: Vec<String> = values.iter().map(|value| format!("part {value} é")).collect();
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        let components = "NumberOfComponents=\"1\"";
+        self.text("<CellData>\n")
+            .array("Int8", "Int8", components, &cast::<i8>(values), i8::to_be_bytes)
+            .array("UInt8", "UInt8", "", values, u8::to_be_bytes)
+            .array("Int16", "Int16", "", &cast::<i16>(values), i16::to_be_bytes)
+            .array("UInt16", "UInt16", "", &cast::<u16>(values), u16::to_be_bytes)
+            .array("Int32", "Int32", "", &cast::<i32>(values), i32::to_be_bytes)
+            .array("UInt32", "UInt32", "", &cast::<u32>(values), u32::to_be_bytes)
+            .array("Int64", "Int64", "", &cast::<i64>(values), i64::to_be_bytes)
+            .array("UInt64", "UInt64", "", &cast::<u64>(values), u64::to_be_bytes)
+            .array("Float32", "Float32", "", &cast::<f32>(values), f32::to_be_bytes)
+            .strings("a &lt; &quot;b&quot;", &words)
+            .array("Int32", "Vector", THREE, &[0; 18], i32::to_be_bytes)
+            .text("</CellData>\n")
+    }
+
+    /// An array of cells as planish writes it.
+    fn label(self, values: &[i32]) -> Self {
+        self.text("<CellData>\n").array("Int32", "label", "", values, i32::to_be_bytes).text("</CellData>\n")
+    }
+
     /// Cells of a section, and their types.
     fn cells(self, section: &str, cells: &[&[i64]], types: &[u8]) -> Self {
         let ends = cells.iter().scan(0, |end, c| {
@@ -214,6 +248,87 @@ impl File {
 const INFORMATION: &str = "<InformationKey name=\"L2\"><Value index=\"0\">1</Value></InformationKey>";
 const THREE: &str = "NumberOfComponents=\"3\"";
 const SQUARE: [f32; 12] = [0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.5];
+
+fn cast<T: TryFrom<u8>>(values: &[u8]) -> Vec<T> {
+    values.iter().map(|value| T::try_from(*value).ok().expect("small")).collect()
+}
+
+/// Polygons with arrays of cells, which are counted in the order vertices, lines, polygons, strips, whatever the order of
+/// sections: 90, 91, 1 and 2, 3. In a second piece there are no such arrays.
+pub(super) fn labelled_polydata(style: Style) -> Vec<u8> {
+    File::new(style, "PolyData")
+        .text("<Piece NumberOfPoints=\"0\"><CellData>")
+        .array("Int32", "label", "", &[1], i32::to_be_bytes)
+        .text("</CellData></Piece>\n")
+        .text("<Piece NumberOfPoints=\"4\" NumberOfVerts=\"1\" NumberOfLines=\"1\" NumberOfStrips=\"1\" NumberOfPolys=\"2\">\n")
+        .points(&SQUARE)
+        .cells("Strips", &[&[0, 1, 3, 2]], &[])
+        .cell_data(&[90, 91, 1, 2, 3])
+        .cells("Polys", &[&[0, 1, 2], &[0, 1, 2, 3]], &[])
+        .cells("Lines", &[&[0, 1]], &[])
+        .cells("Verts", &[&[0]], &[])
+        .text("</Piece>\n<Piece NumberOfPoints=\"4\" NumberOfPolys=\"1\">\n")
+        .points(&SQUARE)
+        .cells("Polys", &[&[0, 1, 2]], &[])
+        .text("</Piece>\n")
+        .finish()
+}
+
+/// A grid of two pieces, in each of which a cell is left out, with an array and names for two of its numbers.
+pub(super) fn labelled_grid(style: Style) -> Vec<u8> {
+    let piece = "<Piece NumberOfPoints=\"4\" NumberOfCells=\"2\">\n";
+    File::new(style, "UnstructuredGrid")
+        .text("<FieldData>\n")
+        .array("Int32", "the wall", "NumberOfTuples=\"2\"", &[7, 2], i32::to_be_bytes)
+        .array("Int32", "nothing of a surface", "NumberOfTuples=\"2\"", &[9, 1], i32::to_be_bytes)
+        .text(&format!("</FieldData>\n{piece}"))
+        .points(&SQUARE)
+        .label(&[90, 7])
+        .cells("Cells", &[&[0, 1], &[0, 1, 2, 3]], &[3, 9])
+        .text(&format!("</Piece>\n{piece}"))
+        .points(&SQUARE)
+        .label(&[9, 90])
+        .cells("Cells", &[&[0, 1, 2], &[0, 1, 2, 3]], &[5, 10])
+        .text("</Piece>\n")
+        .finish()
+}
+
+/// Two pieces and an empty one, with arrays of points of every type; in the last piece there is only one of them. Point 8 belongs
+/// to no triangle.
+pub(super) fn sized_grid(style: Style) -> Vec<u8> {
+    let piece = |points| format!("<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"1\">\n");
+    let values = [3, 1, 4, 0];
+    let empty = "<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"><PointData>";
+    File::new(style, "UnstructuredGrid")
+        .text(empty)
+        .array("Float64", "Float64", "", &[7.0], f64::to_be_bytes)
+        .text(&format!("</PointData></Piece>\n{}<PointData>\n", piece(4)))
+        .array("Int8", "Int8", "NumberOfComponents=\"1\"", &cast::<i8>(&values), i8::to_be_bytes)
+        .array("UInt8", "UInt8", "", &values, u8::to_be_bytes)
+        .array("Int16", "Int16", "", &cast::<i16>(&values), i16::to_be_bytes)
+        .array("UInt16", "UInt16", "", &cast::<u16>(&values), u16::to_be_bytes)
+        .array("Int32", "Int32", "", &cast::<i32>(&values), i32::to_be_bytes)
+        .array("UInt32", "UInt32", "", &cast::<u32>(&values), u32::to_be_bytes)
+        .array("Int64", "Int64", "", &cast::<i64>(&values), i64::to_be_bytes)
+        .array("UInt64", "UInt64", "", &cast::<u64>(&values), u64::to_be_bytes)
+        .array("Float32", "Float32", "", &cast::<f32>(&values), f32::to_be_bytes)
+        .array("Float64", "Float64", "", &cast::<f64>(&values), f64::to_be_bytes)
+        .array("Float64", "a &lt; b", "", &[0.5, 0.25, f64::NAN, -1.0], f64::to_be_bytes)
+        .strings("words", &["a", "b", "c", "d"])
+        .array("Float32", "Vector", THREE, &SQUARE, f32::to_be_bytes)
+        .text("</PointData>\n<Points>\n")
+        .array("Float32", "Points", THREE, &SQUARE, f32::to_be_bytes)
+        .text("</Points>\n")
+        .cells("Cells", &[&[0, 1, 2, 3]], &[9])
+        .text(&format!("</Piece>\n{}<PointData>\n", piece(5)))
+        .array("Float64", "Float64", "", &[5.0, 6.0, 7.0, 8.0, -9.0], f64::to_be_bytes)
+        .text("</PointData>\n<Points>\n")
+        .array("Float32", "Points", THREE, &[&SQUARE[..], &[9.0; 3]].concat(), f32::to_be_bytes)
+        .text("</Points>\n")
+        .cells("Cells", &[&[0, 1, 2, 3]], &[9])
+        .text("</Piece>\n")
+        .finish()
+}
 
 /// Two pieces and an empty one.
 pub(super) fn grid(style: Style) -> Vec<u8> {

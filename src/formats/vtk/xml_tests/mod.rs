@@ -1,9 +1,11 @@
 //! XML files in every encoding, written by a small writer, whole, cut off, and lying.
 
 mod files;
+mod labels;
+mod sizes;
 
 use super::error::{PackedError, VtkError};
-use crate::formats::{Content, Format, Limits, NoSiblings, ReadError, Source, read_alone};
+use crate::formats::{Content, Format, Limits, ReadError, Source, read_alone};
 use crate::outcome::Code;
 use files::{Encoding, PLAIN, Style, compress, grid, polydata, styles, xz};
 
@@ -15,7 +17,7 @@ fn error(bytes: &[u8]) -> VtkError {
 }
 
 fn limited(bytes: &[u8], limits: Limits) -> Result<Content, ReadError> {
-    crate::formats::read(Format::Vtu, &Source { bytes, limits: &limits, beside: &NoSiblings })
+    crate::formats::read(Format::Vtu, &Source::alone(bytes, &limits))
 }
 
 #[test]

@@ -1,0 +1,70 @@
+//! Borders between labels: the surface is cut open along them, so that no chart can cross one.
+//!
+//! Each part of one label gets vertices of its own, as the sheets do that meet at an edge of three triangles: what follows then
+//! knows a border as open boundary, which nothing moves, and the curves between charts join the sides again by their welded
+//! vertices ([`crate::seams`]). The counts of the surface stay those of the whole: a border is no end of the surface.
+
+use super::SurfaceMesh;
+use crate::topology::{EdgeTable, HalfEdgeId, VertexFans, VertexId};
+
+impl SurfaceMesh {
+    /// The same surface, cut open between triangles of different labels; its counts stay those of the whole.
+    pub(crate) fn cut_between_labels(self) -> Self {
+        let are_alike = |g: HalfEdgeId, h: HalfEdgeId| self.label(g.face().index()) == self.label(h.face().index());
+        let is_border = |sides: &[HalfEdgeId]| matches!(*sides, [g, h] if !are_alike(g, h));
+        if !self.edges.iter().any(|(_, sides)| is_border(sides)) {
+            return self;
+        }
+        let joins = |sides: &[HalfEdgeId]| sides.len() == 2 && !is_border(sides);
+        let fans = VertexFans::across(&self.triangles, &self.edges, joins);
+        // Copies of a vertex follow each other, so that the vertices of the input stay in front of those that were added.
+        let mut order: Vec<(VertexId, usize)> = fans.vertices(&self.triangles).into_iter().zip(0..).collect();
+        order.sort_unstable();
+        let mut of_fan = vec![VertexId(0); order.len()];
+        for (number, (_, fan)) in order.iter().enumerate() {
+            of_fan[*fan] = VertexId::at(number);
+        }
+        let renamed = |face: usize| [0, 1, 2].map(|k| of_fan[fans.of_corner[3 * face + k] as usize]);
+        let triangles: Vec<[VertexId; 3]> = (0..self.triangles.len()).map(renamed).collect();
+        Self {
+            points: order.iter().map(|(v, _)| self.points[v.index()]).collect(),
+            welded: order.iter().map(|(v, _)| self.welded[v.index()]).collect(),
+            sizes: order.iter().filter_map(|(v, _)| self.sizes.get(v.index()).copied()).collect(),
+            added_from: order.partition_point(|(v, _)| v.index() < self.added_from),
+            edges: EdgeTable::new(&triangles),
+            triangles,
+            ..self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::topology::TopologySummary;
+    use crate::{repair, shapes};
+
+    /// A sphere of three labels, that meet in the poles: three parts with vertices of their own, and the counts of a sphere.
+    #[test]
+    fn every_part_of_a_label_gets_vertices_of_its_own() {
+        let soup = shapes::sphere(8);
+        let sector = |t: &[u32; 3]| {
+            let [x, y] = [0, 1].map(|k| t.iter().map(|v| soup.points()[*v as usize][k]).sum::<f64>());
+            (y.atan2(x) / std::f64::consts::TAU * 3.0 + 1.5).floor() as u32 % 3
+        };
+        let labels: Vec<u32> = soup.triangles().iter().map(sector).collect();
+        let whole = repair(&soup.clone().with_labels(labels.clone()), &Default::default()).expect("a surface").mesh;
+        let cut = whole.clone().cut_between_labels();
+        let parts = TopologySummary::new(cut.triangles(), cut.edges());
+        assert_eq!((parts.components, parts.boundary_loops), (3, 3));
+        assert_eq!(cut.topology_summary(), whole.topology_summary());
+        for face in 0..cut.triangles().len() {
+            assert_eq!(cut.label(face), Some(labels[face]));
+            assert_eq!(cut.corners(face), whole.corners(face));
+            let welded = |mesh: &crate::mesh::SurfaceMesh| mesh.triangles()[face].map(|v| mesh.welded_vertex(v));
+            assert_eq!(welded(&cut), welded(&whole));
+        }
+        // Without a border nothing changes.
+        let one = repair(&soup.with_labels(vec![7; labels.len()]), &Default::default()).expect("a surface").mesh;
+        assert_eq!(one.clone().cut_between_labels().points().len(), one.points().len());
+    }
+}
