@@ -6,6 +6,7 @@
 #   tests/full/run.sh disk             kills, failures and others at every operation of the disk
 #   tests/full/run.sh kills            300 kills of the daemon
 #   tests/full/run.sh load             an hour of mixed load (PLANISH_FULL_SECONDS: for so long)
+#   tests/full/run.sh recipes          docs/simulate.md, through real solvers: MFEM, NGSolve, Netgen, TetGen, CalculiX
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -33,8 +34,23 @@ corpus() {
   target/release/planish check -q "$out"/*/ || echo "full: corpus: not all results are proven again"
 }
 
+# The recipes of docs/simulate.md, in an environment of their own; what needs ccx or tetgen is skipped where these are not there.
+recipes() {
+  local folder=tests/full/recipes venv code=0
+  cargo build --release --locked
+  venv=$(mktemp -d)
+  trap 'rm -rf "$venv"' RETURN
+  python3 -m venv "$venv"
+  "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$folder/requirements.txt"
+  for recipe in "$folder"/*_*.py; do
+    PATH="$PWD/target/release:$venv/bin:$PATH" "$venv/bin/python" -B "$recipe" >"$venv/said" 2>&1 || code=1
+    grep '^full:' "$venv/said" || { echo "full: recipes: $(basename "$recipe"): FAILED"; cat "$venv/said"; }
+  done
+  return "$code"
+}
+
 if [ $# = 0 ]; then
-  set -- corpus disk kills load
+  set -- corpus disk kills load recipes
 fi
 for part in "$@"; do
   case $part in
@@ -42,6 +58,7 @@ for part in "$@"; do
     disk) heavy full_kills_failures ;;
     kills) heavy full_three_hundred_kills ;;
     load) heavy full_an_hour ;;
-    *) echo "usage: $0 [corpus] [disk] [kills] [load]" >&2; exit 2 ;;
+    recipes) recipes ;;
+    *) echo "usage: $0 [corpus] [disk] [kills] [load] [recipes]" >&2; exit 2 ;;
   esac
 done
