@@ -7,10 +7,12 @@
 
 use super::Wanted;
 use crate::formats::gmsh::Group;
+use crate::formats::{Label, label_index};
 use planish_core::CertifiedAtlas;
-use planish_core::seams::{Curve, CurveSide};
-use planish_core::topology::{CurveId, HalfEdgeId};
-use planish_core::vec3::{Vec3, cross, distance, dot, norm, sub};
+use planish_core::measure::bends::dihedral_cosines;
+use planish_core::seams::Curve;
+use planish_core::topology::CurveId;
+use planish_core::vec3::distance;
 use std::collections::BTreeSet;
 
 /// A surface with more ends than this has one group for all of them: as many groups as a sieve has holes help nobody.
@@ -40,16 +42,11 @@ fn of_charts(atlas: &CertifiedAtlas) -> Vec<Group> {
 }
 
 fn of_labels(atlas: &CertifiedAtlas, wanted: &Wanted) -> Vec<Group> {
-    let group = |label: &crate::formats::Label| Group {
-        dimension: 2,
-        tag: label.tag,
-        name: label.group.clone(),
-        entities: Vec::new(),
-    };
+    let group = |label: &Label| Group { dimension: 2, tag: label.tag, name: label.group.clone(), entities: Vec::new() };
     let mut groups: Vec<Group> = wanted.labels.iter().map(group).collect();
     for (index, chart) in atlas.charts().iter().enumerate() {
-        if let Some(group) = atlas.label(chart.id()).and_then(|label| groups.get_mut(label as usize)) {
-            group.entities.push(index);
+        if let Some(label) = label_index(atlas, chart.id(), wanted.labels) {
+            groups[label].entities.push(index);
         }
     }
     groups
@@ -75,27 +72,8 @@ fn features(atlas: &CertifiedAtlas, angle: f64) -> Vec<usize> {
 
 /// The length of the segments of a seam at which its two charts meet at more than an angle.
 fn sharp_length(atlas: &CertifiedAtlas, curve: &Curve, angle: f64) -> f64 {
-    let [first, second] = curve.sides() else { return 0.0 };
-    let cos = angle.to_radians().cos();
-    let sign = if first.forward == second.forward { -1.0 } else { 1.0 };
-    let mut sharp = 0.0;
-    for (g, h) in first.half_edges.iter().zip(&second.half_edges) {
-        let normals = [normal(atlas, first, *g), normal(atlas, second, *h)];
-        let lengths = normals.map(norm);
-        if sign * dot(normals[0], normals[1]) < cos * lengths[0] * lengths[1] {
-            sharp += length(atlas, first, *g);
-        }
-    }
-    sharp
-}
-
-fn normal(atlas: &CertifiedAtlas, side: &CurveSide, h: HalfEdgeId) -> Vec3 {
-    let [a, b, c] = atlas.charts()[side.chart.index()].chart().corners(h.face().index());
-    cross(sub(b, a), sub(c, a))
-}
-
-fn length(atlas: &CertifiedAtlas, side: &CurveSide, h: HalfEdgeId) -> f64 {
-    let chart = atlas.charts()[side.chart.index()].chart();
-    let [from, to] = [h, h.next()].map(|h| chart.points()[chart.from(h).index()]);
-    distance(from, to)
+    let cosines = dihedral_cosines(atlas.charts(), curve).unwrap_or_default();
+    let segments = curve.vertices().windows(2).map(|ends| [ends[0], ends[1]].map(|v| atlas.mesh().points()[v.index()]));
+    let sharp = segments.zip(cosines).filter(|(_, cosine)| *cosine < angle.to_radians().cos());
+    sharp.map(|([from, to], _)| distance(from, to)).sum()
 }

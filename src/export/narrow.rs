@@ -40,8 +40,9 @@ const LEAST: f64 = 1.0 / 32.0;
 /// zigzag, as on raw marching cubes (plate_genus9: edges of a quarter of the size, in the median).
 const PLACES_PER_CURVE: usize = 8;
 
-/// So many places altogether, the narrowest: Gmsh asks every size field at every step, and spends as much time on these as on
-/// the rest (truck_nonmanifold with 2,000: 46 s of CPU in place of 6).
+/// So many places altogether, the narrowest. The bound is from when each was a field of Gmsh's, which asks all of them at every step
+/// (truck_nonmanifold with 2,000: 46 s of CPU in place of 6); as one field, more would cost little, but what they do to elements
+/// was not looked at.
 const MOST_PLACES: usize = 400;
 
 /// Where a place already has elements smaller than so many times what it needs, nothing is added.

@@ -4,24 +4,14 @@ use super::narrow::{self, Places};
 use super::{Sizes, Wanted};
 use crate::formats::gmsh::Algorithms;
 use planish_core::CertifiedAtlas;
-use planish_core::measure::curvature;
-use planish_core::measure::sizes::{SizeField, SizedPlace, SizedTriangle};
+use planish_core::measure::bends::bends;
+use planish_core::measure::sizes::{SizeField, SizedPlace, SizedTriangle, TOLD_UP_TO};
 use planish_core::measure::spikes::spikes;
 use planish_core::mesh::SurfaceMesh;
 use planish_core::subdivide::LinearAtlas;
-use planish_core::topology::{HalfEdgeId, VertexId};
-use planish_core::vec3::{Vec3, cross, distance, dot, norm, sub};
+use planish_core::topology::VertexId;
+use planish_core::vec3::Vec3;
 use std::f64::consts::PI;
-
-/// Sizes are told up to so many times the size that is asked for: a larger one may be given to the script later.
-const MOST: f64 = 4.0;
-
-/// Seams at which charts meet at more than this angle, in degrees, are creases: there the surface bends, and has no curvature.
-/// As the lower threshold of features.
-const CREASE: f64 = 25.0;
-
-/// Where a curve turns by more than this, in degrees, it has a corner, and no curvature.
-const CORNER: f64 = 40.0;
 
 /// An edge over a bend of curvature k with the deviation D is sqrt(6 D / k) long: the middle of an equilateral triangle on a
 /// sphere is off by k l^2 / 6. Edges of a mesh are up to 1.4 times as long as they are asked to be, and curvature is a mean.
@@ -70,7 +60,7 @@ pub(super) fn varying(
     found.least = places.iter().map(|place| place.size).reduce(f64::min);
     let field = SizeField::new(places, sizes.gradation);
     let surface = (0..mesh.triangles().len()).map(|face| asked_between(mesh, face, sizes));
-    found.triangles = field.sampled(surface, MOST * sizes.size);
+    found.triangles = field.sampled(surface, TOLD_UP_TO * sizes.size);
     found
 }
 
@@ -89,23 +79,11 @@ fn hold(places: &mut Vec<SizedPlace>, sizes: &Sizes, found: &mut Varying) {
 /// What the user asks for, at every vertex.
 fn asked_for(atlas: &CertifiedAtlas, sizes: &Sizes) -> Vec<SizedPlace> {
     let mesh = atlas.mesh();
-    let by_curvature = sizes.per_turn.is_some() || sizes.deviation.is_some();
-    let mut curvatures = vec![0.0; if by_curvature { mesh.points().len() } else { 0 }];
-    if by_curvature {
-        let sharp = CREASE.to_radians().cos();
-        let chart_of = charts_of_faces(atlas);
-        let normals: Vec<Vec3> = (0..mesh.triangles().len()).map(|face| unit_normal(mesh.corners(face))).collect();
-        let is_crease = |g: HalfEdgeId, h: HalfEdgeId| {
-            let [g, h] = [g, h].map(|h| h.face().index());
-            chart_of[g] != chart_of[h] && dot(normals[g], normals[h]) < sharp
-        };
-        curvatures = curvature::largest(mesh, is_crease);
-        bends_of_curves(atlas, &normals, sharp, &mut curvatures);
-    }
     let mut places = Vec::new();
-    for (v, k) in curvatures.iter().enumerate() {
-        let size = size_at(*k, sizes);
-        places.push(SizedPlace { at: mesh.points()[v], size, reach: 0.0 });
+    if sizes.per_turn.is_some() || sizes.deviation.is_some() {
+        let bends = bends(mesh, atlas.charts(), atlas.seams());
+        let place = |(at, k): (&Vec3, &f64)| SizedPlace { at: *at, size: size_at(*k, sizes), reach: 0.0 };
+        places.extend(mesh.points().iter().zip(&bends).map(place));
     }
     for (v, at) in mesh.points().iter().enumerate() {
         places.extend(mesh.given_size(VertexId::at(v)).map(|size| SizedPlace { at: *at, size, reach: 0.0 }));
@@ -126,61 +104,6 @@ fn size_at(k: f64, sizes: &Sizes) -> f64 {
     let by_turn = sizes.per_turn.map_or(f64::INFINITY, |n| 2.0 * PI / (n * k));
     let by_deviation = sizes.deviation.map_or(f64::INFINITY, |d| (6.0 * d / k).sqrt() / TOO_LONG);
     by_turn.min(by_deviation)
-}
-
-/// The chart of each triangle.
-fn charts_of_faces(atlas: &CertifiedAtlas) -> Vec<u32> {
-    let mut chart_of = vec![0; atlas.mesh().triangles().len()];
-    for certified in atlas.charts() {
-        certified.chart().faces().iter().for_each(|face| chart_of[face.index()] = certified.id().0);
-    }
-    chart_of
-}
-
-fn unit_normal([a, b, c]: [Vec3; 3]) -> Vec3 {
-    let normal = cross(sub(b, a), sub(c, a));
-    let length = norm(normal);
-    if length > 0.0 { normal.map(|c| c / length) } else { [0.0; 3] }
-}
-
-/// Adds the curvature of the curves that are edges of the shape: open boundary, and creases. Seams elsewhere run anyhow.
-fn bends_of_curves(atlas: &CertifiedAtlas, normals: &[Vec3], sharp: f64, curvatures: &mut [f64]) {
-    let mesh = atlas.mesh();
-    let normal = |side: &planish_core::seams::CurveSide, i: usize| {
-        let chart = atlas.charts()[side.chart.index()].chart();
-        normals[chart.faces()[side.half_edges[i].face().index()].index()]
-    };
-    for curve in atlas.seams().curves() {
-        let is_sharp = |i: usize| match curve.sides() {
-            [g, h] => dot(normal(g, i), normal(h, i)) < sharp,
-            _ => true,
-        };
-        let segments = curve.segments();
-        let is_edge = (0..segments).filter(|i| is_sharp(*i)).count() * 2 >= segments;
-        if !is_edge {
-            continue;
-        }
-        let vertices = curve.vertices();
-        let count = vertices.len();
-        let inner = 1..count - 1;
-        // A closed curve goes on where it began.
-        let around = curve.is_closed().then_some([vertices[count - 2], vertices[0], vertices[1]]);
-        let triples = inner.map(|i| [vertices[i - 1], vertices[i], vertices[i + 1]]).chain(around);
-        for triple in triples.collect::<Vec<_>>() {
-            let [p, q, r] = triple.map(|v| mesh.points()[v.index()]);
-            let k = &mut curvatures[triple[1].index()];
-            *k = k.max(bend([p, q, r]));
-        }
-    }
-}
-
-/// The curvature of a polyline at its middle point: the angle by which it turns, over the mean length of its segments; 0 at
-/// a corner.
-fn bend([p, q, r]: [Vec3; 3]) -> f64 {
-    let [along, on] = [sub(q, p), sub(r, q)];
-    let angle = norm(cross(along, on)).atan2(dot(along, on));
-    let length = 0.5 * (distance(p, q) + distance(q, r));
-    if angle < CORNER.to_radians() && length > 0.0 { angle / length } else { 0.0 }
 }
 
 #[cfg(test)]

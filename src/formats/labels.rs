@@ -5,7 +5,9 @@
 
 use super::Notes;
 use crate::settings::LabelSource;
+use planish_core::CertifiedAtlas;
 use planish_core::mesh::TriangleSoup;
+use planish_core::topology::ChartId;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashMap};
 
@@ -266,6 +268,11 @@ pub(super) fn asked<'a>(
         Some(array) => Ok(Some(array)),
         None => Err(LabelError::Missing { asked: asked.clone(), there: there.map(str::to_owned).collect() }),
     }
+}
+
+/// The position of the label of a chart in the list; none where there are no labels.
+pub fn label_index(atlas: &CertifiedAtlas, chart: ChartId, labels: &[Label]) -> Option<usize> {
+    atlas.label(chart).map(|label| label as usize).filter(|label| *label < labels.len())
 }
 
 #[cfg(test)]

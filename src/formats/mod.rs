@@ -32,7 +32,7 @@ use crate::outcome::{Code, Reason};
 pub use crate::settings::{LabelSource, Limits};
 pub use content::{Content, NoSiblings, Notes, SiblingFiles, Source, TooMany};
 pub use gltf::glb;
-pub use labels::{Label, LabelError};
+pub use labels::{Label, LabelError, label_index};
 use location::Location;
 pub use obj::surface as surface_obj;
 pub use patches::Patches;

@@ -5,11 +5,10 @@
 //! boundary. A chart in whose quadratic map a straight triangle would be turned over has the texture coordinates of
 //! that one. So no texture coordinates fold, up to rounding.
 
-use super::labels::Label;
+use super::labels::{Label, label_index};
 use super::layout::{Placement, layout};
 use planish_core::certify::PlanarMap;
 use planish_core::grid::orientation;
-use planish_core::topology::ChartId;
 use planish_core::{CertifiedAtlas, CertifiedChart};
 use std::collections::BTreeMap;
 
@@ -76,11 +75,6 @@ pub(super) fn parts<'a>(atlas: &'a CertifiedAtlas, labels: &'a [Label]) -> Vec<P
         charts.entry(label_index(atlas, certified.id(), labels)).or_default().push(certified);
     }
     charts.into_iter().map(|(index, charts)| Part { label: index.map(|i| &labels[i]), charts }).collect()
-}
-
-/// The position of the label of a chart in the list.
-pub(super) fn label_index(atlas: &CertifiedAtlas, chart: ChartId, labels: &[Label]) -> Option<usize> {
-    atlas.label(chart).map(|label| label as usize).filter(|label| *label < labels.len())
 }
 
 #[cfg(test)]

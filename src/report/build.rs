@@ -4,8 +4,8 @@ use super::{
     Boundary, BoundaryShape, Certificate, ChartBoundary, ChartReport, Counts, Distortion, LabelReport, Linear,
     Quadratic, RepairedSurface, Repairs, Seam, Seams, Surface, Untangle,
 };
-use crate::formats::Label;
 use crate::formats::layout::{Placement, layout};
+use crate::formats::{Label, label_index};
 use planish_core::atlas::Chart;
 use planish_core::certified::BoundaryFound;
 use planish_core::certify::{BoundaryArgument, CertifiedMap, PlanarMap};
@@ -50,7 +50,8 @@ pub fn labels(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<LabelReport> {
     let report = |label: &Label| LabelReport { label: label.clone(), charts: 0, triangles: 0, area: 0.0 };
     let mut reports: Vec<LabelReport> = labels.iter().map(report).collect();
     for chart in atlas.charts() {
-        let Some(report) = atlas.label(chart.id()).and_then(|label| reports.get_mut(label as usize)) else { continue };
+        let Some(index) = label_index(atlas, chart.id(), labels) else { continue };
+        let report = &mut reports[index];
         report.charts += 1;
         report.triangles += chart.chart().triangles().len();
         report.area += chart.chart().true_area();

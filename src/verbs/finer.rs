@@ -7,12 +7,9 @@ use crate::report::mesh::Distance;
 use crate::result_files::FINER;
 use crate::settings::USUAL_GRADATION;
 use crate::system::disk::{self, Disk, System};
-use planish_core::measure::sizes::{SizeField, SizedPlace, SizedTriangle};
+use planish_core::measure::sizes::{SizeField, SizedPlace, SizedTriangle, TOLD_UP_TO};
 use planish_core::soundness::{BARELY, Deviation, Triangulation};
 use std::path::Path;
-
-/// Sizes are told up to so many times the size of all: beyond, nothing is asked for.
-const MOST: f64 = 4.0;
 
 /// Asks for edges half as long at all elements that are too far from the surface; returns the places where they would be shorter
 /// than may be.
@@ -55,7 +52,7 @@ pub(super) fn ask(
     let anything = [f64::INFINITY; 3];
     let triangles =
         (0..surface.triangles.len()).map(|t| SizedTriangle { corners: surface.corners(t), sizes: anything });
-    let bytes = gmsh::sizes(&field.sampled(triangles, MOST * hand_off.size), hand_off.enlarged);
+    let bytes = gmsh::sizes(&field.sampled(triangles, TOLD_UP_TO * hand_off.size), hand_off.enlarged);
     let written = System.open(folder).and_then(|folder| disk::replace_file(&folder, &folder, name, &bytes));
     written.map_err(|error| format!("{name} cannot be written: {error}"))?;
     Ok(held)

@@ -256,7 +256,7 @@ fn edge_measure(along: Vec3, left: Vec3, right: Vec3) -> Tensor {
 }
 
 /// The unit normal of a triangle; zero where it has none.
-fn unit_normal(p: [Vec3; 3]) -> Vec3 {
+pub(super) fn unit_normal(p: [Vec3; 3]) -> Vec3 {
     let n = cross(sub(p[1], p[0]), sub(p[2], p[0]));
     let length = norm(n);
     if length > 0.0 { n.map(|c| c / length) } else { [0.0; 3] }

@@ -1,5 +1,6 @@
 //! Measures: how maps distort, and how surfaces bend.
 
+pub mod bends;
 pub mod curvature;
 pub mod distortion;
 pub(crate) mod quantiles;

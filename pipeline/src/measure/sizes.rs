@@ -17,6 +17,9 @@
 
 use crate::vec3::{BoundingBox, Vec3, distance, midpoint};
 
+/// Fields are told up to so many times the size that is asked for everywhere: a larger one may be given to a mesher later.
+pub const TOLD_UP_TO: f64 = 4.0;
+
 /// Places of a leaf, at most. By experience: smaller leaves take more boxes, larger ones more looks at places.
 const LEAF: usize = 8;
 

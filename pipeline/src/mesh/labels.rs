@@ -5,7 +5,7 @@
 //! vertices ([`crate::seams`]). The counts of the surface stay those of the whole: a border is no end of the surface.
 
 use super::SurfaceMesh;
-use crate::topology::{EdgeTable, HalfEdgeId, VertexFans, VertexId};
+use crate::topology::{EdgeTable, HalfEdgeId, VertexFans};
 
 impl SurfaceMesh {
     /// The same surface, cut open between triangles of different labels; its counts stay those of the whole.
@@ -18,19 +18,12 @@ impl SurfaceMesh {
         let joins = |sides: &[HalfEdgeId]| sides.len() == 2 && !is_border(sides);
         let fans = VertexFans::across(&self.triangles, &self.edges, joins);
         // Copies of a vertex follow each other, so that the vertices of the input stay in front of those that were added.
-        let mut order: Vec<(VertexId, usize)> = fans.vertices(&self.triangles).into_iter().zip(0..).collect();
-        order.sort_unstable();
-        let mut of_fan = vec![VertexId(0); order.len()];
-        for (number, (_, fan)) in order.iter().enumerate() {
-            of_fan[*fan] = VertexId::at(number);
-        }
-        let renamed = |face: usize| [0, 1, 2].map(|k| of_fan[fans.of_corner[3 * face + k] as usize]);
-        let triangles: Vec<[VertexId; 3]> = (0..self.triangles.len()).map(renamed).collect();
+        let (triangles, copied) = fans.numbered(&self.triangles);
         Self {
-            points: order.iter().map(|(v, _)| self.points[v.index()]).collect(),
-            welded: order.iter().map(|(v, _)| self.welded[v.index()]).collect(),
-            sizes: order.iter().filter_map(|(v, _)| self.sizes.get(v.index()).copied()).collect(),
-            added_from: order.partition_point(|(v, _)| v.index() < self.added_from),
+            points: copied.iter().map(|v| self.points[v.index()]).collect(),
+            welded: copied.iter().map(|v| self.welded[v.index()]).collect(),
+            sizes: copied.iter().filter_map(|v| self.sizes.get(v.index()).copied()).collect(),
+            added_from: copied.partition_point(|v| v.index() < self.added_from),
             edges: EdgeTable::new(&triangles),
             triangles,
             ..self

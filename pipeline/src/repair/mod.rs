@@ -435,9 +435,11 @@ impl MeshBuilder {
         report: &mut Report,
     ) -> SurfaceMesh {
         let fans = VertexFans::new(&self.triangles, &edges);
-        let (of_fan, welded) = split_vertices(&fans.vertices(&self.triangles), report);
-        let renamed = |face: usize| [0, 1, 2].map(|k| of_fan[fans.of_corner[3 * face + k] as usize]);
-        let triangles: Vec<_> = (0..self.triangles.len()).map(renamed).collect();
+        let (triangles, copied) = fans.numbered(&self.triangles);
+        for copies in copied.chunk_by(|a, b| a == b).filter(|copies| copies.len() > 1) {
+            report.split_vertices.push(copies[0].0);
+        }
+        let welded: Vec<u32> = copied.into_iter().map(|v| v.0).collect();
         let points: Vec<Vec3> = welded.iter().map(|w| self.points[*w as usize]).collect();
         let corners: Vec<_> = triangles.iter().map(|t| t.map(|v: VertexId| points[v.index()])).collect();
         let diagonal = BoundingBox::of(points.iter().copied()).map_or(0.0, |b| b.diagonal());
@@ -468,22 +470,6 @@ fn are_rejoined(sides: &[HalfEdgeId], fans: &VertexFans) -> bool {
     }
     ends.sort_unstable();
     ends.windows(2).any(|pair| pair[0] == pair[1])
-}
-
-/// One vertex per fan, in ascending order of the vertices they come from: per fan its vertex, and per
-/// vertex the welded point it is a copy of.
-fn split_vertices(fan_vertices: &[VertexId], report: &mut Report) -> (Vec<VertexId>, Vec<u32>) {
-    let mut order: Vec<(VertexId, usize)> = fan_vertices.iter().copied().zip(0..).collect();
-    order.sort_unstable();
-    let mut of_fan = vec![VertexId(0); order.len()];
-    let welded = order.iter().map(|(v, _)| v.0).collect();
-    for (new, (_, fan)) in order.iter().enumerate() {
-        of_fan[*fan] = VertexId::at(new);
-    }
-    for copies in order.chunk_by(|a, b| a.0 == b.0).filter(|c| c.len() > 1) {
-        report.split_vertices.push(copies[0].0.0);
-    }
-    (of_fan, welded)
 }
 
 /// Vertices at which sheets touch, one of them not at its boundary: no boundary loop passes through them there.

@@ -89,6 +89,19 @@ impl VertexFans {
         Self { of_corner, count }
     }
 
+    /// A vertex for every fan, in ascending order of the vertices that they come from: those of the triangles' corners, and per
+    /// vertex the one that it is a copy of. Copies of a vertex follow each other.
+    pub(crate) fn numbered(&self, triangles: &[[VertexId; 3]]) -> (Vec<[VertexId; 3]>, Vec<VertexId>) {
+        let mut order: Vec<(VertexId, usize)> = self.vertices(triangles).into_iter().zip(0..).collect();
+        order.sort_unstable();
+        let mut of_fan = vec![VertexId(0); order.len()];
+        for (number, (_, fan)) in order.iter().enumerate() {
+            of_fan[*fan] = VertexId::at(number);
+        }
+        let renamed = |face: usize| [0, 1, 2].map(|k| of_fan[self.of_corner[3 * face + k] as usize]);
+        ((0..triangles.len()).map(renamed).collect(), order.into_iter().map(|(v, _)| v).collect())
+    }
+
     /// The vertex of each fan.
     pub fn vertices(&self, triangles: &[[VertexId; 3]]) -> Vec<VertexId> {
         let mut vertices = vec![VertexId(0); self.count];

@@ -3,8 +3,8 @@
 use super::error::VtkError;
 pub use super::read_back::{read, read_shape};
 use super::vtm::escape;
-use crate::formats::Label;
 use crate::formats::layout::layout;
+use crate::formats::{Label, label_index};
 use planish_core::atlas::Chart;
 use planish_core::measure::distortion::CellFields;
 use planish_core::topology::{ChartId, EdgeId, VertexId};
@@ -81,7 +81,7 @@ pub fn surface(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Vec<u8>, VtuE
 /// # Errors
 /// [`VtuError::Library`].
 pub fn part(atlas: &CertifiedAtlas, labels: &[Label], label: usize) -> Result<Vec<u8>, VtuError> {
-    let is_part = |c: &&CertifiedChart| atlas.label(c.id()) == Some(label as u32);
+    let is_part = |c: &&CertifiedChart| label_index(atlas, c.id(), labels) == Some(label);
     let charts: Vec<_> = atlas.charts().iter().filter(is_part).collect();
     encode(atlas, &charts, labels, "planish surface", |certified, node, _| position(certified.chart(), node))
 }
@@ -257,5 +257,5 @@ fn cell_fields(atlas: &CertifiedAtlas, charts: &[&CertifiedChart], labels: &[Lab
 
 /// The tag of the label of a chart; -1 where there are no labels.
 pub(super) fn tag_of(atlas: &CertifiedAtlas, chart: ChartId, labels: &[Label]) -> i32 {
-    atlas.label(chart).and_then(|label| labels.get(label as usize)).map_or(-1, |label| label.tag)
+    label_index(atlas, chart, labels).map_or(-1, |index| labels[index].tag)
 }

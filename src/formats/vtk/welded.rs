@@ -6,8 +6,7 @@
 
 use super::vtu::{VtuError, array, write};
 use crate::formats::joined::JoinedVertices;
-use crate::formats::labels::Label;
-use crate::formats::texture::label_index;
+use crate::formats::labels::{Label, label_index};
 use planish_core::CertifiedAtlas;
 use planish_core::atlas::Chart;
 use planish_core::mesh::SurfaceMesh;
