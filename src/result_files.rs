@@ -21,8 +21,11 @@ pub const ATLAS_MSH: &str = "atlas.msh";
 /// The same in a larger unit, where Gmsh needs that.
 pub const ENLARGED_MSH: &str = "atlas-enlarged.msh";
 
-/// Sizes on the surface, where they vary, which [`REMESH`] reads; in the unit of the file that it merges.
+/// Sizes around the surface, where they vary, which [`REMESH`] reads; in the unit of the file that it merges.
 pub const SIZES: &str = "sizes.pos";
+
+/// What an array of the input asks for on the triangles of the surface, likewise: where `--size-from` names one.
+pub const SIZES_OF_ARRAY: &str = "sizes-array.pos";
 
 /// The script that has Gmsh remesh through the maps.
 pub const REMESH: &str = "remesh.geo";

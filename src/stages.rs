@@ -169,11 +169,12 @@ pub fn assemble(
     }
     let mut hand_off = None;
     if settings.hand_off == settings::ExportTarget::Gmsh {
-        let size = settings.size.unwrap_or_else(|| atlas.mesh().default_size());
+        let least = settings.size_min.unwrap_or(0.0);
+        let size = settings.size.unwrap_or_else(|| atlas.mesh().default_size().max(least));
         let features = settings.feature_angle.filter(|_| settings.names_features);
         let sizes = export::Sizes {
             size,
-            min: settings.size_min.unwrap_or(0.0).min(size),
+            min: least.min(size),
             per_turn: settings.size_curvature,
             deviation: settings.deviation,
             gradation: settings.gradation,

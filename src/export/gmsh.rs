@@ -1,8 +1,8 @@
 //! The hand-off to Gmsh: `atlas.msh` and `remesh.geo`, with the edge length that the script asks for.
 
-use super::Wanted;
 use super::groups::groups;
 use super::sizes::{Varying, varying};
+use super::{Sizes, Wanted};
 use crate::formats::gmsh;
 use crate::report::{ExportReport, HeldPlace};
 use crate::result_files;
@@ -11,7 +11,7 @@ use planish_core::certified::BoundaryFound;
 use planish_core::evaluate::Plane;
 use planish_core::map::natural::{Natural, natural};
 use planish_core::measure::distortion::Summary;
-use planish_core::measure::sizes::{SizedPlace, SizedTriangle};
+use planish_core::measure::sizes::SizedPlace;
 use planish_core::monitor::{Interrupted, Monitor};
 use planish_core::subdivide::{self, LinearAtlas, subdivide};
 use planish_core::topology::{ChartId, FaceId};
@@ -83,7 +83,7 @@ pub fn gmsh(atlas: &CertifiedAtlas, wanted: &Wanted, monitor: &dyn Monitor) -> R
     let varying = varying(atlas, &linear, &algorithms, wanted);
     let mut report = counted(report, &linear, &algorithms, &varying);
     if let Some(held) = varying.held.first() {
-        report.warning.get_or_insert_with(|| held_up(wanted.sizes.min, varying.held_places, held));
+        report.warning.get_or_insert_with(|| held_up(&wanted.sizes, &varying, held));
     }
     if let Some(warning) = &report.warning {
         tracing::warn!("hand-off to Gmsh: {warning}");
@@ -97,9 +97,10 @@ pub fn gmsh(atlas: &CertifiedAtlas, wanted: &Wanted, monitor: &dyn Monitor) -> R
         curves,
         algorithms,
         order: wanted.order,
+        has_array: !varying.array.is_empty(),
         heeds_finer: wanted.sizes.deviation.is_some(),
     };
-    let files = files(atlas, &linear, &groups(atlas, wanted), &varying.triangles, &script);
+    let files = files(atlas, &linear, &groups(atlas, wanted), &varying, &script);
     Ok(Export { files, report })
 }
 
@@ -178,7 +179,7 @@ fn files(
     atlas: &CertifiedAtlas,
     linear: &LinearAtlas,
     groups: &[gmsh::Group],
-    sizes: &[SizedTriangle],
+    sizes: &Varying,
     script: &gmsh::Script,
 ) -> Vec<(String, Vec<u8>)> {
     let mut files = vec![
@@ -187,7 +188,10 @@ fn files(
     ];
     let factor = script.algorithms.enlarged;
     if script.least.is_some() {
-        files.push((result_files::SIZES.to_owned(), gmsh::sizes(sizes, factor)));
+        files.push((result_files::SIZES.to_owned(), gmsh::on_cubes(&sizes.cubes, factor)));
+    }
+    if script.has_array {
+        files.push((result_files::SIZES_OF_ARRAY.to_owned(), gmsh::on_triangles(&sizes.array, factor)));
     }
     if factor != 1.0 {
         files.push((result_files::ENLARGED_MSH.to_owned(), gmsh::enlarged(linear, atlas.seams(), groups, factor)));
@@ -206,6 +210,7 @@ fn counted(
         narrow_places: varying.narrow_places,
         spikes: varying.spikes,
         least_size: varying.least,
+        floor: varying.floor,
         held_places: varying.held_places,
         held: varying.held.iter().map(|place| HeldPlace { at: place.at, size: place.size }).collect(),
         adapted_charts: algorithms.adapted.iter().map(|c| *c as u32).collect(),
@@ -233,13 +238,19 @@ fn too_coarse(size: f64, distance: f64) -> String {
     )
 }
 
-/// What may go wrong where the least size stands in the way of smaller ones.
-fn held_up(least: f64, places: usize, first: &SizedPlace) -> String {
+/// What may go wrong where smaller sizes are needed than may be.
+fn held_up(sizes: &Sizes, varying: &Varying, first: &SizedPlace) -> String {
     let [x, y, z] = first.at;
+    let (least, advice) = match varying.floor {
+        Some(floor) => {
+            (floor, "they would take millions of elements; mesh the part of the surface that has them by itself")
+        }
+        None => (sizes.min, "give a smaller --size-min"),
+    };
     format!(
-        "at {places} places elements of less than the least edge length {least:.4e} are needed, the first at ({x:.4e}, {y:.4e}, \
-         {z:.4e}), of {:.4e}: elements may be bad there, or parts lost; give a smaller --size-min",
-        first.size
+        "at {} places elements of less than the least edge length {least:.4e} are needed, the first at ({x:.4e}, {y:.4e}, \
+         {z:.4e}), of {:.4e}: elements may be bad there, or parts lost; {advice}",
+        varying.held_places, first.size
     )
 }
 

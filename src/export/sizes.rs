@@ -2,10 +2,10 @@
 
 use super::narrow::{self, Places};
 use super::{Sizes, Wanted};
-use crate::formats::gmsh::Algorithms;
+use crate::formats::gmsh::{Algorithms, SizedTriangle};
 use planish_core::CertifiedAtlas;
 use planish_core::measure::bends::bends;
-use planish_core::measure::sizes::{SizeField, SizedPlace, SizedTriangle, TOLD_UP_TO};
+use planish_core::measure::sizes::{SizeField, SizedCube, SizedPlace, TOLD_UP_TO};
 use planish_core::measure::spikes::spikes;
 use planish_core::mesh::SurfaceMesh;
 use planish_core::subdivide::LinearAtlas;
@@ -18,12 +18,16 @@ use std::f64::consts::PI;
 const TOO_LONG: f64 = 1.5;
 
 /// Where elements are smaller than everywhere else.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Varying {
-    /// The sizes on triangles, as far as they are below the largest ones; empty where sizes do not vary.
-    pub triangles: Vec<SizedTriangle>,
+    /// The sizes around the surface, as far as they are below the largest ones; empty where sizes do not vary.
+    pub cubes: Vec<SizedCube>,
+    /// What an array of the input asks for on the triangles of the surface; likewise.
+    pub array: Vec<SizedTriangle>,
     /// The least size.
     pub least: Option<f64>,
+    /// Narrow places and spikes ask for no less than this, as more would take too many elements; none where they need not be held.
+    pub floor: Option<f64>,
     /// How many curves along narrow places have smaller elements.
     pub narrow_curves: usize,
     /// At how many narrow places there are.
@@ -35,6 +39,15 @@ pub(super) struct Varying {
     /// How many such places there are.
     pub held_places: usize,
 }
+
+/// Sizes of narrow places and spikes are told on so many cubes at most, or on one for so many triangles of the surface. What
+/// takes more has millions of elements: of generic_twin_7081, needles as long as the part and a millionth as wide, two
+/// million cubes.
+const MOST_CUBES: usize = 500_000;
+const TRIANGLES_PER_CUBE: usize = 2;
+
+/// Where that is not enough, they ask for no less than these shares of the size, one after the other, and at last for nothing.
+const FLOORS: [f64; 3] = [0.0, 1.0 / 16.0, 1.0 / 4.0];
 
 /// So many of the places are told where smaller elements are needed than may be.
 const TOLD: usize = 8;
@@ -49,31 +62,42 @@ pub(super) fn varying(
     let (mesh, charts, sizes) = (atlas.mesh(), atlas.charts(), &wanted.sizes);
     let Places { sized, curves, gaps } = narrow::places(mesh, charts, atlas.seams(), &algorithms.adapted, sizes.size);
     let thin = spikes(mesh, charts, linear.curvatures(), sizes.size);
-    let mut found = Varying { narrow_curves: curves, narrow_places: gaps, spikes: thin.len(), ..Varying::default() };
-    let mut places = sized;
-    places.extend(thin.iter().map(|s| SizedPlace { at: s.centre, size: s.size, reach: s.radius }));
-    places.extend(asked_for(atlas, sizes));
-    hold(&mut places, sizes, &mut found);
-    if places.is_empty() {
-        return found;
-    }
-    found.least = places.iter().map(|place| place.size).reduce(f64::min);
-    let field = SizeField::new(places, sizes.gradation);
-    let surface = (0..mesh.triangles().len()).map(|face| asked_between(mesh, face, sizes));
-    found.triangles = field.sampled(surface, TOLD_UP_TO * sizes.size);
-    found
+    let counts = Varying { narrow_curves: curves, narrow_places: gaps, spikes: thin.len(), ..Varying::default() };
+    let mut needed = sized;
+    needed.extend(thin.iter().map(|s| SizedPlace { at: s.centre, size: s.size, reach: s.radius }));
+    let asked = asked_for(atlas, sizes);
+    let surface: Vec<[Vec3; 3]> = (0..mesh.triangles().len()).map(|face| mesh.corners(face)).collect();
+    let with_floor = |share: f64, at_most: usize| {
+        let floor = share * sizes.size;
+        let mut found = Varying { floor: (floor > sizes.min).then_some(floor), ..counts.clone() };
+        let mut places = hold(&needed, floor.max(sizes.min), &mut found);
+        places.extend(hold(&asked, sizes.min, &mut found));
+        places.retain(|place| place.size < sizes.size);
+        if places.is_empty() {
+            return Some(found);
+        }
+        found.least = places.iter().map(|place| place.size).reduce(f64::min);
+        found.cubes = SizeField::new(places, sizes.gradation).told(&surface, TOLD_UP_TO * sizes.size, at_most)?;
+        found.array = (0..surface.len()).filter_map(|face| asked_between(mesh, face, sizes)).collect();
+        Some(found)
+    };
+    let at_most = MOST_CUBES.max(surface.len() / TRIANGLES_PER_CUBE);
+    let found = FLOORS.into_iter().find_map(|share| with_floor(share, at_most));
+    // What is asked for is told, however much it takes.
+    found.or_else(|| with_floor(1.0, usize::MAX)).unwrap_or_default()
 }
 
-/// Holds sizes above the least one that may be, and keeps those below the size of all.
-fn hold(places: &mut Vec<SizedPlace>, sizes: &Sizes, found: &mut Varying) {
-    for place in places.iter_mut().filter(|place| place.size < sizes.min) {
+/// The places with sizes held above the least one that may be.
+fn hold(places: &[SizedPlace], least: f64, found: &mut Varying) -> Vec<SizedPlace> {
+    let mut held = places.to_vec();
+    for place in held.iter_mut().filter(|place| place.size < least) {
         found.held_places += 1;
         if found.held.len() < TOLD {
             found.held.push(*place);
         }
-        place.size = sizes.min;
+        place.size = least;
     }
-    places.retain(|place| place.size < sizes.size);
+    held
 }
 
 /// What the user asks for, at every vertex.
@@ -93,10 +117,13 @@ fn asked_for(atlas: &CertifiedAtlas, sizes: &Sizes) -> Vec<SizedPlace> {
     places
 }
 
-/// A triangle with the sizes that the input asks for at its corners, and in between.
-fn asked_between(mesh: &SurfaceMesh, face: usize, sizes: &Sizes) -> SizedTriangle {
-    let asked = mesh.triangles()[face].map(|v| mesh.given_size(v).map_or(f64::INFINITY, |size| size.max(sizes.min)));
-    SizedTriangle { corners: mesh.corners(face), sizes: asked }
+/// A triangle with the sizes that the input asks for at its corners, and in between; none where it does not at all of them.
+fn asked_between(mesh: &SurfaceMesh, face: usize, sizes: &Sizes) -> Option<SizedTriangle> {
+    let mut asked = [0.0; 3];
+    for (size, v) in asked.iter_mut().zip(mesh.triangles()[face]) {
+        *size = mesh.given_size(v).filter(|size| *size > 0.0)?.clamp(sizes.min, TOLD_UP_TO * sizes.size);
+    }
+    Some(SizedTriangle { corners: mesh.corners(face), sizes: asked })
 }
 
 /// The length of edges over a bend of curvature `k`.
@@ -134,7 +161,7 @@ mod tests {
     }
 
     /// What is found of a square whose mesh shall have edges of a size at most and one at least; and that at its vertices, by
-    /// their x, the field is what is expected.
+    /// their x, the field is what is expected, as closely as cubes tell it.
     fn found(atlas: &CertifiedAtlas, size: f64, min: f64, expected: impl Fn(f64) -> f64) -> Varying {
         let linear = subdivide(atlas, &vec![None; atlas.charts().len()]).expect("triangles");
         let sizes = Sizes { size, min, per_turn: None, deviation: None, gradation: 0.4 };
@@ -142,15 +169,26 @@ mod tests {
         let found = varying(atlas, &linear, &Algorithms { adapted: vec![], enlarged: 1.0 }, &wanted);
         let mesh = atlas.mesh();
         let of_input = (0..mesh.points().len()).filter(|v| mesh.input_vertex(VertexId::at(*v)).is_some());
-        let vertices: Vec<Vec3> = of_input.map(|v| mesh.points()[v]).collect();
-        let told = found.triangles.iter().flat_map(|t| t.corners.into_iter().zip(t.sizes));
-        let told: Vec<(Vec3, f64)> = told.filter(|(x, _)| vertices.contains(x)).collect();
-        assert!(told.len() > 100, "{}", told.len());
-        for (x, size) in told {
+        let mut asked = 0;
+        for x in of_input.map(|v| mesh.points()[v]) {
+            let corners = found.array.iter().flat_map(|t| t.corners.into_iter().zip(t.sizes));
+            let by_array = corners.filter(|(at, _)| *at == x).map(|(_, size)| size).reduce(f64::min);
+            asked += usize::from(by_array.is_some());
+            let told = by_array.unwrap_or(f64::INFINITY).min(on_cubes(&found.cubes, x));
             let expected = expected(x[0]);
-            assert!((size - expected).abs() <= 1e-12 * expected, "{size} for {expected} at {x:?}");
+            assert!((told - expected).abs() <= 0.15 * expected, "{told} for {expected} at {x:?}");
         }
+        assert!(asked > 60, "{asked}");
         found
+    }
+
+    /// What is interpolated in the cube around a point.
+    fn on_cubes(cubes: &[SizedCube], x: Vec3) -> f64 {
+        let is_in = |cube: &&SizedCube| (0..3).all(|k| (0.0..=cube.side).contains(&(x[k] - cube.low[k])));
+        let cube = cubes.iter().find(is_in).expect("cubes all around");
+        let along = [0, 1, 2].map(|k| (x[k] - cube.low[k]) / cube.side);
+        let share = |corner: usize, k: usize| if corner >> k & 1 == 1 { along[k] } else { 1.0 - along[k] };
+        (0..8).map(|corner| (0..3).map(|k| share(corner, k)).product::<f64>() * cube.sizes[corner]).sum()
     }
 
     /// The array: from 0.02 to 0.2.
@@ -161,9 +199,11 @@ mod tests {
     #[test]
     fn sizes_at_vertices_are_those_of_the_array() {
         let atlas = square(linear);
+        let corners = |t: &SizedTriangle| t.corners.into_iter().zip(t.sizes).collect::<Vec<_>>();
         assert_eq!(atlas.mesh().default_size(), linear(1.0), "the largest of them is that of all");
         let free = found(&atlas, linear(1.0), 0.0, linear);
         assert_eq!((free.least, free.held_places), (Some(0.02), 0));
+        assert!(free.array.iter().flat_map(corners).all(|(x, size)| (size - linear(x[0])).abs() <= 1e-12 * size));
         let held = found(&atlas, linear(1.0), 0.05, |x| linear(x).max(0.05));
         let is_below = |v: &usize| atlas.mesh().given_size(VertexId::at(*v)).is_some_and(|size| size < 0.05);
         let below = (0..atlas.mesh().points().len()).filter(is_below).count();
@@ -178,5 +218,16 @@ mod tests {
         found(&none, 0.2, 0.0, |x| if x < 0.55 { 0.05 } else { grown(x) });
         let steep = square(|x| if x < 0.55 { 0.05 } else { 0.2 });
         found(&steep, 0.2, 0.0, |x| if x < 0.55 { 0.05 } else { grown(x).min(0.2) });
+    }
+
+    /// Places are held above a least size, each of them is counted, and the first are told.
+    #[test]
+    fn places_below_the_least_size_are_held_and_counted() {
+        let place = |size: f64| SizedPlace { at: [size, 0.0, 0.0], size, reach: 0.0 };
+        let places: Vec<SizedPlace> = (1..=20).map(|k| place(f64::from(k))).collect();
+        let mut found = Varying::default();
+        let held = hold(&places, 12.5, &mut found);
+        assert!(held.iter().zip(&places).all(|(held, place)| held.size == place.size.max(12.5) && held.at == place.at));
+        assert_eq!((found.held_places, found.held.len(), found.held[7].size), (12, TOLD, 8.0));
     }
 }

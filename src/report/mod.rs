@@ -630,6 +630,9 @@ pub struct ExportReport {
     /// The least edge length that it asks for; null where all are alike.
     #[serde(default)]
     pub least_size: Option<f64>,
+    /// Narrow places and spikes get no smaller elements than this, as those would be too many; null where they get what they need.
+    #[serde(default)]
+    pub floor: Option<f64>,
     /// Places where smaller elements are needed than the least edge length allows.
     #[serde(default)]
     pub held_places: usize,

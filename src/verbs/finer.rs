@@ -7,9 +7,13 @@ use crate::report::mesh::Distance;
 use crate::result_files::FINER;
 use crate::settings::USUAL_GRADATION;
 use crate::system::disk::{self, Disk, System};
-use planish_core::measure::sizes::{SizeField, SizedPlace, SizedTriangle, TOLD_UP_TO};
+use planish_core::measure::sizes::{SizeField, SizedPlace, TOLD_UP_TO};
 use planish_core::soundness::{BARELY, Deviation, Triangulation};
 use std::path::Path;
+
+/// How far shorter edges reach around an element that is too far from the surface, in its longest edge: the next mesh has other
+/// elements there. Of max_planck_decimated at a thousandth of its diagonal, 13 were left after three times with 1.
+const REACH: f64 = 2.0;
 
 /// Asks for edges half as long at all elements that are too far from the surface; returns the places where they would be shorter
 /// than may be.
@@ -40,19 +44,19 @@ pub(super) fn ask(
         if size < least {
             held.push(Distance { distance: found.distance, at: found.at });
         }
-        places.push(SizedPlace { at: found.at, size: size.max(least), reach: found.longest });
+        places.push(SizedPlace { at: found.at, size: size.max(least), reach: REACH * found.longest });
     }
-    // The chord error falls with the square of edges: where the limit is kept barely, they shall keep it with room to spare.
+    // Across the edges of facets the error falls with the length of edges: where the limit is kept barely, they shall keep it with
+    // room to spare.
     for found in &deviation.barely {
-        let size = found.longest * (BARELY * deviation.limit / found.distance).sqrt();
-        places.push(SizedPlace { at: found.at, size: size.max(least), reach: found.longest });
+        let size = found.longest * BARELY * deviation.limit / found.distance;
+        places.push(SizedPlace { at: found.at, size: size.max(least), reach: REACH * found.longest });
     }
     let gradation = report.settings.gradation.unwrap_or(USUAL_GRADATION);
     let field = SizeField::new(places, gradation);
-    let anything = [f64::INFINITY; 3];
-    let triangles =
-        (0..surface.triangles.len()).map(|t| SizedTriangle { corners: surface.corners(t), sizes: anything });
-    let bytes = gmsh::sizes(&field.sampled(triangles, TOLD_UP_TO * hand_off.size), hand_off.enlarged);
+    let triangles: Vec<_> = (0..surface.triangles.len()).map(|t| surface.corners(t)).collect();
+    let cubes = field.told(&triangles, TOLD_UP_TO * hand_off.size, usize::MAX).unwrap_or_default();
+    let bytes = gmsh::on_cubes(&cubes, hand_off.enlarged);
     let written = System.open(folder).and_then(|folder| disk::replace_file(&folder, &folder, name, &bytes));
     written.map_err(|error| format!("{name} cannot be written: {error}"))?;
     Ok(held)

@@ -6,34 +6,31 @@
 //!
 //! which is the largest field that is nowhere above what is asked for, and whose slope is at most g (the distance transform of
 //! sampled functions; Persson 2006, *Mesh size functions for implicit geometry and PDE-based gradient limiting*, doi
-//! 10.1007/s00366-006-0014-1, solves for it along a surface; here distances are those of space). Places are found in a k-d tree
-//! whose boxes know the least that is asked for in them: a value costs the logarithm of their number where sizes are graded.
+//! 10.1007/s00366-006-0014-1, solves for it along a surface; here distances are those of space).
 //!
-//! Where sizes are asked for at all points of a triangle, as the values of an array at its corners tell them, the field is no more
-//! than that in between.
-//!
-//! Meshers take values on triangles: [`SizeField::sampled`] bisects those of a surface until linear interpolation tells the
-//! field, so that the long facets of CAD files do not spread small sizes over their whole length.
+//! Meshers take values on cells: [`SizeField::told`] halves a cube around a surface, and the cubes that meet it, until trilinear
+//! interpolation tells the field (an octree; Yerry and Shephard 1983, doi 10.1109/MCG.1983.262997). How many cubes that takes
+//! depends on the field, and not on the triangles of the surface: bisecting those made millions of a fan of needles as
+//! long as the part (generic_twin_7081), each over the same places.
 
-use crate::vec3::{BoundingBox, Vec3, distance, midpoint};
+use crate::vec3::{BoundingBox, Vec3, cross, distance, dot, sub};
 
 /// Fields are told up to so many times the size that is asked for everywhere: a larger one may be given to a mesher later.
 pub const TOLD_UP_TO: f64 = 4.0;
 
-/// Places of a leaf, at most. By experience: smaller leaves take more boxes, larger ones more looks at places.
-const LEAF: usize = 8;
-
-/// Linear interpolation tells a field well enough if it is off by less than this share of it. By experience: elements vary
-/// by more than that around the size they are asked for.
+/// Interpolation tells a field well enough if it is off by less than this share of it. By experience: elements vary by more than
+/// that around the size they are asked for.
 const CLOSE: f64 = 0.1;
 
-/// A place of small size hides between the points that are looked at where sizes could change by more than so many times
-/// themselves over a triangle. Where they cannot, the points are no farther apart than the field around such a place reaches.
-const STEEP: f64 = 2.0;
+/// No place hides between the points that are looked at that asks for less than this share of the least that is found there.
+const HIDDEN: f64 = 1.0 / 1.5;
 
-/// A triangle is bisected so often at most: from the length of a bounding box to a thousandth of a thousandth of it, along
-/// both directions.
-const MAX_BISECTIONS: u32 = 40;
+/// Cubes are halved so often at most: to the accuracy of single numbers, as no size is told to more.
+const MAX_HALVINGS: u32 = 40;
+
+/// The cube around a surface begins so much before it, in its sides: facets of parts with flat sides would lie between cubes
+/// else, in both of them.
+const BEFORE: f64 = 0.0137;
 
 /// A place at which edges of a length are asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,13 +50,35 @@ impl SizedPlace {
     }
 }
 
-/// A triangle with the sizes at its corners.
+/// A cube with the sizes at its corners.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SizedTriangle {
-    /// Its corners.
-    pub corners: [Vec3; 3],
-    /// The sizes there.
-    pub sizes: [f64; 3],
+pub struct SizedCube {
+    /// The corner with the least coordinates.
+    pub low: Vec3,
+    /// The length of its sides.
+    pub side: f64,
+    /// The sizes at its corners, along x first, then y, then z.
+    pub sizes: [f64; 8],
+}
+
+impl SizedCube {
+    /// A corner: the bits of its number tell where it is along x, y and z.
+    pub fn corner(&self, number: usize) -> Vec3 {
+        [0, 1, 2].map(|k| self.low[k] + if number >> k & 1 == 1 { self.side } else { 0.0 })
+    }
+
+    /// How far a point is from the cube, and from its farthest corner.
+    fn distances(&self, x: Vec3) -> (f64, f64) {
+        let half = 0.5 * self.side;
+        let (mut nearest, mut farthest) = (0.0, 0.0);
+        for (x, low) in x.iter().zip(self.low) {
+            let off = (x - low - half).abs();
+            let outside = (off - half).max(0.0);
+            nearest += outside * outside;
+            farthest += (off + half) * (off + half);
+        }
+        (f64::sqrt(nearest), f64::sqrt(farthest))
+    }
 }
 
 /// The length of edges, place by place.
@@ -75,173 +94,189 @@ pub struct SizedTriangle {
 /// ```
 #[derive(Clone, Debug)]
 pub struct SizeField {
-    /// In the order of the leaves.
     places: Vec<SizedPlace>,
-    /// Children `2 i + 1` and `2 i + 2` of node `i` hold the halves of its places.
-    nodes: Vec<Option<Node>>,
     gradation: f64,
-}
-
-/// What is known of some places.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    around: BoundingBox,
-    /// The least size, and the largest reach.
-    size: f64,
-    reach: f64,
 }
 
 impl SizeField {
     /// The field of these places; sizes grow by `gradation` times the distance, which is positive.
-    pub fn new(mut places: Vec<SizedPlace>, gradation: f64) -> Self {
-        let depth = (places.len() / LEAF + 1).next_power_of_two().ilog2();
-        // A complete binary tree, with 2^(depth + 1) - 1 nodes.
-        let mut nodes = vec![None; (2 << depth) - 1];
-        build(&mut places, &mut nodes, 0);
-        Self { places, nodes, gradation }
+    pub fn new(places: Vec<SizedPlace>, gradation: f64) -> Self {
+        Self { places, gradation }
     }
 
-    /// Whether nothing is asked for anywhere.
-    pub fn is_empty(&self) -> bool {
-        self.places.is_empty()
-    }
-
-    /// The size at a point; infinite where nothing is asked for anywhere.
+    /// The size at a point; infinite where nothing is asked for anywhere. All places are looked at.
     pub fn at(&self, x: Vec3) -> f64 {
-        let mut least = f64::INFINITY;
-        let mut stack = vec![(0, 0, self.places.len())];
-        while let Some((number, start, end)) = stack.pop() {
-            if self.bound(number, x) >= least {
-                continue;
-            }
-            let [low, high] = [2 * number + 1, 2 * number + 2];
-            if high >= self.nodes.len() {
-                for place in &self.places[start..end] {
-                    least = least.min(place.asks(distance(place.at, x), self.gradation));
-                }
-                continue;
-            }
-            let middle = usize::midpoint(start, end);
-            let mut children = [(low, start, middle), (high, middle, end)];
-            // What may be less comes off the stack first.
-            if self.bound(low, x) < self.bound(high, x) {
-                children.reverse();
-            }
-            stack.extend(children);
-        }
-        least
+        self.least(self.places.iter(), x)
     }
 
-    /// What no place of a node asks less than, at a point.
-    fn bound(&self, number: usize, x: Vec3) -> f64 {
-        self.nodes[number].map_or(f64::INFINITY, |node| {
-            let off = [0, 1, 2].map(|k| (node.around.min[k] - x[k]).max(x[k] - node.around.max[k]).max(0.0));
-            let distance = off.iter().map(|d| d * d).sum::<f64>().sqrt();
-            node.size + self.gradation * (distance - node.reach).max(0.0)
-        })
+    /// The least that some places ask for at a point.
+    fn least<'a>(&self, places: impl Iterator<Item = &'a SizedPlace>, x: Vec3) -> f64 {
+        places.map(|place| place.asks(distance(place.at, x), self.gradation)).fold(f64::INFINITY, f64::min)
     }
 
-    /// The field on triangles that cover those of a surface where it is below `most`: each is bisected at its longest side while
-    /// interpolation is off, and the side longer than the elements there. Sizes are cut off at `most`; triangles with nothing
-    /// below it are left out.
+    /// The field on cubes that cover the triangles of a surface where it is below `most`, where sizes are cut off; none where that
+    /// takes more than `at_most` cubes.
     ///
-    /// The sizes of the triangles that are given are asked for between their corners, too, in a straight line from one to the
-    /// other; infinite ones ask for nothing. (Their corners themselves are places.)
-    ///
-    /// It ends: sizes are positive, and halves of a side become shorter than any of them.
-    pub fn sampled(&self, surface: impl Iterator<Item = SizedTriangle>, most: f64) -> Vec<SizedTriangle> {
-        let mut sampled = Vec::new();
-        for SizedTriangle { corners, sizes: asked } in surface {
-            let sizes = [0, 1, 2].map(|k| self.at(corners[k]).min(asked[k]).min(most));
-            let mut waiting = vec![Part { triangle: SizedTriangle { corners, sizes }, asked, bisections: 0 }];
-            while let Some(part) = waiting.pop() {
-                match self.bisected(&part, most) {
-                    Some(halves) => waiting.extend(halves),
-                    None if part.triangle.sizes.iter().any(|size| *size < most) => sampled.push(part.triangle),
-                    None => {}
+    /// It ends: sizes are positive, and sides become shorter than any of them.
+    pub fn told(&self, surface: &[[Vec3; 3]], most: f64, at_most: usize) -> Option<Vec<SizedCube>> {
+        let mut told = Vec::new();
+        let mut waiting: Vec<Cell> = self.whole(surface, most).into_iter().collect();
+        while let Some(cell) = waiting.pop() {
+            let lattice = self.on_lattice(&cell, most);
+            if !self.is_told(&cell, &lattice, most) {
+                waiting.extend((0..8).filter_map(|octant| self.octant(&cell, octant, &lattice, surface, most)));
+            } else if cell.cube.sizes.iter().any(|size| *size < most) {
+                if told.len() == at_most {
+                    return None;
                 }
+                told.push(cell.cube);
             }
         }
-        sampled
+        Some(told)
     }
 
-    /// The halves of a part, where it needs them.
-    fn bisected(&self, part: &Part, most: f64) -> Option<[Part; 2]> {
-        let SizedTriangle { corners, sizes } = part.triangle;
-        let lengths = [0, 1, 2].map(|k| distance(corners[k], corners[(k + 1) % 3]));
-        let longest = (1..3).fold(0, |best, k| if lengths[k] > lengths[best] { k } else { best });
-        let centre = [0, 1, 2].map(|k| corners.iter().map(|c| c[k]).sum::<f64>() / 3.0);
-        let inside = self.at(centre);
-        // Nothing within reach of the triangle is below this.
-        let is_free = inside - self.gradation * lengths[longest] >= most && sizes.iter().all(|size| *size >= most);
-        if is_free || part.bisections >= MAX_BISECTIONS {
-            return None;
-        }
-        let middles = [0, 1, 2].map(|k| midpoint(corners[k], corners[(k + 1) % 3]));
-        let field = middles.map(|x| self.at(x));
-        let asked = [0, 1, 2].map(|k| 0.5 * (part.asked[k] + part.asked[(k + 1) % 3]));
-        let found = [0, 1, 2].map(|k| field[k].min(asked[k]).min(most));
-        let at_centre = inside.min(part.asked.iter().sum::<f64>() / 3.0);
-        let is_told = |found: f64, told: f64| (found - told).abs() <= CLOSE * found;
-        let are_told = (0..3).all(|k| is_told(found[k], 0.5 * (sizes[k] + sizes[(k + 1) % 3])))
-            && is_told(at_centre.min(most), sizes.iter().sum::<f64>() / 3.0);
-        let least = found.iter().fold(at_centre, |least, size| least.min(*size));
-        // What is asked for in between hides no place: only the field of places tells of others.
-        let least_of_field = field.iter().fold(inside, |least, size| least.min(*size));
-        let is_overlooked = self.gradation * lengths[longest] > STEEP * least_of_field.min(most);
-        if lengths[longest] <= least || (are_told && !is_overlooked) {
-            return None;
-        }
-        Some(part.halves(longest, found[longest], asked[longest]))
-    }
-}
-
-/// A part of a triangle that is looked at.
-struct Part {
-    /// With the sizes that were found.
-    triangle: SizedTriangle,
-    /// The sizes that are asked for at its corners, where those in between count; else infinite.
-    asked: [f64; 3],
-    /// How often it was bisected.
-    bisections: u32,
-}
-
-impl Part {
-    /// Its halves, with what was found and what is asked for in the middle of a side.
-    fn halves(&self, side: usize, size: f64, asked: f64) -> [Self; 2] {
-        let SizedTriangle { corners, sizes } = self.triangle;
-        let [a, b, c] = [0, 1, 2].map(|k| (side + k) % 3);
-        let middle = midpoint(corners[a], corners[b]);
-        let half = |corners, sizes, asked| {
-            let triangle = SizedTriangle { corners, sizes };
-            Self { triangle, asked, bisections: self.bisections + 1 }
+    /// The cube around all of a surface; none where nothing is asked for.
+    fn whole(&self, surface: &[[Vec3; 3]], most: f64) -> Option<Cell> {
+        let around = BoundingBox::of(surface.iter().flatten().copied())?;
+        let extent = (0..3).map(|k| around.max[k] - around.min[k]).fold(0.0, f64::max);
+        let mut cube = SizedCube {
+            low: around.min.map(|c| c - BEFORE * extent),
+            side: (1.0 + 2.0 * BEFORE) * extent,
+            sizes: [most; 8],
         };
-        let of = &self.asked;
-        [
-            half([corners[a], middle, corners[c]], [sizes[a], size, sizes[c]], [of[a], asked, of[c]]),
-            half([middle, corners[b], corners[c]], [size, sizes[b], sizes[c]], [asked, of[b], of[c]]),
-        ]
+        for corner in 0..8 {
+            cube.sizes[corner] = self.at(cube.corner(corner)).min(most);
+        }
+        let all = |count: usize| (0..count as u32).collect::<Vec<u32>>();
+        let places = self.near(&cube, &all(self.places.len()), most);
+        (!places.is_empty()).then(|| Cell { cube, places, faces: all(surface.len()), halvings: 0 })
+    }
+
+    /// Those places that ask for the least at some point of a cube, or may do so.
+    fn near(&self, cube: &SizedCube, places: &[u32], most: f64) -> Vec<u32> {
+        let mut least = most;
+        let mut near = Vec::with_capacity(places.len());
+        for i in places {
+            let place = &self.places[*i as usize];
+            let (nearest, farthest) = cube.distances(place.at);
+            let at_least = place.asks(nearest, self.gradation);
+            if at_least <= least && at_least < most {
+                near.push((*i, at_least));
+                least = least.min(place.asks(farthest, self.gradation));
+            }
+        }
+        near.iter().filter(|(_, at_least)| *at_least <= least).map(|(i, _)| *i).collect()
+    }
+
+    /// The field at the corners of a cube and in between: at 3 times 3 times 3 points, along x first.
+    fn on_lattice(&self, cell: &Cell, most: f64) -> [f64; LATTICE] {
+        let mut lattice = [most; LATTICE];
+        for (number, value) in lattice.iter_mut().enumerate() {
+            let steps = steps(number);
+            *value = if steps.iter().all(|step| *step != 1) {
+                cell.cube.sizes[corner_number(steps.map(|step| step / 2))]
+            } else {
+                let x = [0, 1, 2].map(|k| cell.cube.low[k] + 0.5 * steps[k] as f64 * cell.cube.side);
+                self.least(cell.places.iter().map(|i| &self.places[*i as usize]), x).min(most)
+            };
+        }
+        lattice
+    }
+
+    /// Whether the sizes at the corners of a cube tell the field in it.
+    fn is_told(&self, cell: &Cell, lattice: &[f64; LATTICE], most: f64) -> bool {
+        let ask = |i: &u32| {
+            let place = &self.places[*i as usize];
+            place.asks(cell.cube.distances(place.at).0, self.gradation)
+        };
+        let least = cell.places.iter().map(ask).fold(most, f64::min);
+        if cell.cube.side <= least || cell.halvings == MAX_HALVINGS {
+            return true;
+        }
+        let found = lattice.iter().copied().fold(most, f64::min);
+        let is_close = |(number, found): (usize, &f64)| (cell.told(number) - found).abs() <= CLOSE * found;
+        least >= HIDDEN * found && lattice.iter().enumerate().all(is_close)
+    }
+
+    /// An eighth of a cube, where the surface passes through it and places ask for less than `most` there.
+    fn octant(
+        &self,
+        cell: &Cell,
+        octant: usize,
+        lattice: &[f64; LATTICE],
+        surface: &[[Vec3; 3]],
+        most: f64,
+    ) -> Option<Cell> {
+        let side = 0.5 * cell.cube.side;
+        let from = [0, 1, 2].map(|k| octant >> k & 1);
+        let low = [0, 1, 2].map(|k| cell.cube.low[k] + from[k] as f64 * side);
+        let mut cube = SizedCube { low, side, sizes: [most; 8] };
+        for corner in 0..8 {
+            let [i, j, k] = [0, 1, 2].map(|k| from[k] + (corner >> k & 1));
+            cube.sizes[corner] = lattice[i + 3 * j + 9 * k];
+        }
+        let places = self.near(&cube, &cell.places, most);
+        if places.is_empty() {
+            return None;
+        }
+        let faces: Vec<u32> = cell.faces.iter().copied().filter(|f| meets(&cube, &surface[*f as usize])).collect();
+        (!faces.is_empty()).then_some(Cell { cube, places, faces, halvings: cell.halvings + 1 })
     }
 }
 
-/// Sorts places into the halves of a node, along the longest side of its box.
-fn build(places: &mut [SizedPlace], nodes: &mut [Option<Node>], number: usize) {
-    let Some(around) = BoundingBox::of(places.iter().map(|place| place.at)) else { return };
-    let size = places.iter().map(|place| place.size).fold(f64::INFINITY, f64::min);
-    let reach = places.iter().map(|place| place.reach).fold(0.0, f64::max);
-    nodes[number] = Some(Node { around, size, reach });
-    if 2 * number + 2 >= nodes.len() {
-        return;
+/// Points at which a cube is looked at.
+const LATTICE: usize = 27;
+
+/// Where a point of the lattice is along x, y and z: 0, 1 or 2.
+fn steps(number: usize) -> [usize; 3] {
+    [number % 3, number / 3 % 3, number / 9]
+}
+
+/// The number of the corner that is there along x, y and z: 0 or 1.
+fn corner_number([i, j, k]: [usize; 3]) -> usize {
+    i + 2 * j + 4 * k
+}
+
+/// A cube that is looked at.
+struct Cell {
+    cube: SizedCube,
+    /// The places that tell the field in it.
+    places: Vec<u32>,
+    /// The triangles that pass through it.
+    faces: Vec<u32>,
+    /// How often it was halved.
+    halvings: u32,
+}
+
+impl Cell {
+    /// What trilinear interpolation tells at a point of the lattice: the mean of the corners around it.
+    fn told(&self, number: usize) -> f64 {
+        let steps = steps(number);
+        let is_around = |corner: &usize| (0..3).all(|k| steps[k] == 1 || steps[k] / 2 == corner >> k & 1);
+        let (sum, count) =
+            (0..8).filter(is_around).fold((0.0, 0.0), |(sum, count), c| (sum + self.cube.sizes[c], count + 1.0));
+        sum / count
     }
-    let extent = [0, 1, 2].map(|k| around.max[k] - around.min[k]);
-    let axis = (1..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
-    let middle = places.len() / 2;
-    if middle > 0 {
-        places.select_nth_unstable_by(middle, |p, q| p.at[axis].total_cmp(&q.at[axis]));
-    }
-    let (low, high) = places.split_at_mut(middle);
-    build(low, nodes, 2 * number + 1);
-    build(high, nodes, 2 * number + 2);
+}
+
+/// Whether a triangle and a cube have points in common, but for what rounding leaves undecided: then no axis separates them, of
+/// those across the sides of the cube, of the triangle, and pairs of both (Akenine-Moller 2001, *Fast 3D triangle-box overlap
+/// testing*, doi 10.1080/10867651.2001.10487535).
+fn meets(cube: &SizedCube, triangle: &[Vec3; 3]) -> bool {
+    let half = 0.5 * cube.side;
+    let centre = cube.low.map(|c| c + half);
+    let corners = triangle.map(|corner| sub(corner, centre));
+    let sides = [0, 1, 2].map(|k| sub(corners[(k + 1) % 3], corners[k]));
+    let units = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let separates = |axis: Vec3| {
+        let along = corners.map(|corner| dot(axis, corner));
+        let reach = half * axis.iter().map(|c| c.abs()).sum::<f64>() * (1.0 + 1e-9);
+        along.iter().all(|x| *x > reach) || along.iter().all(|x| *x < -reach)
+    };
+    let is_apart = units.into_iter().any(separates)
+        || separates(cross(sides[0], sides[1]))
+        || units.into_iter().any(|unit| sides.into_iter().any(|side| separates(cross(unit, side))));
+    !is_apart
 }
 
 #[cfg(test)]
@@ -258,66 +293,71 @@ mod tests {
         (0..count).map(place).collect()
     }
 
+    /// The size that trilinear interpolation tells at a point; none outside all cubes.
+    fn told_at(cubes: &[SizedCube], x: Vec3) -> Option<f64> {
+        let is_in = |cube: &&SizedCube| (0..3).all(|k| (0.0..=cube.side).contains(&(x[k] - cube.low[k])));
+        let cube = cubes.iter().find(is_in)?;
+        let along = [0, 1, 2].map(|k| (x[k] - cube.low[k]) / cube.side);
+        let weight = |corner: usize| -> f64 {
+            (0..3).map(|k| if corner >> k & 1 == 1 { along[k] } else { 1.0 - along[k] }).product()
+        };
+        Some((0..8).map(|corner| weight(corner) * cube.sizes[corner]).sum())
+    }
+
+    /// Points all over a triangle.
+    fn over([a, b, c]: [Vec3; 3], steps: u32) -> Vec<Vec3> {
+        let at = |i: u32, j: u32| {
+            let [s, t] = [i, j].map(|n| f64::from(n) / f64::from(steps));
+            [0, 1, 2].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]))
+        };
+        (0..=steps).flat_map(|i| (0..=steps - i).map(move |j| at(i, j))).collect()
+    }
+
     #[test]
-    fn the_tree_finds_the_least_of_all_places() {
-        for count in [1, 7, 8, 9, 100, 1000] {
-            let all = places(count);
-            let field = SizeField::new(all.clone(), 0.3);
-            for i in 0..200 {
-                let x = [i * 3 % 110, i * 11 % 90, i * 17 % 70].map(f64::from);
-                let least = all.iter().map(|p| p.asks(distance(p.at, x), 0.3)).fold(f64::INFINITY, f64::min);
-                assert_eq!(field.at(x), least, "{count} places");
+    fn cubes_tell_the_least_of_all_places() {
+        let surface = [[[-5.0, -5.0, 40.0], [110.0, 0.0, 20.0], [0.0, 100.0, 50.0]]];
+        for count in [1, 9, 100, 1000] {
+            let field = SizeField::new(places(count), 0.3);
+            let cubes = field.told(&surface, 30.0, usize::MAX).expect("any number");
+            for x in over(surface[0], 60) {
+                let (found, told) = (field.at(x).min(30.0), told_at(&cubes, x).unwrap_or(30.0));
+                assert!((told - found).abs() <= 0.25 * found, "{told} for {found} at {x:?}, {count} places");
             }
         }
     }
 
-    /// On a facet a thousand times as long as elements are at its end, interpolation tells the field, and the small ones do not
-    /// spread over it. The corners alone would not tell of a place in the middle of a side.
+    /// On a facet a thousand times as long as elements are at its end, or in the middle of a side, cubes are small there alone; and
+    /// a fan of a hundred needles over the same place takes no more than one of them.
     #[test]
-    fn long_facets_are_bisected_where_sizes_change() {
+    fn cubes_are_small_where_sizes_are_whatever_the_triangles() {
         let facet = [[0.0; 3], [1000.0, 0.0, 0.0], [0.0, 10.0, 0.0]];
+        let rib = |k: u32| [1000.0, 0.01 * f64::from(k), 0.0];
+        let needles: Vec<_> = (0..100).map(|k| [[0.0; 3], rib(k), rib(k + 1)]).collect();
         for at in [[0.0; 3], [437.0, 0.0, 0.0]] {
             let field = SizeField::new(vec![SizedPlace { at, size: 1.0, reach: 2.0 }], 0.4);
-            let sampled = field.sampled(std::iter::once(free(facet)), 100.0);
-            assert!((20..2000).contains(&sampled.len()), "{} triangles", sampled.len());
-            for SizedTriangle { corners, sizes } in &sampled {
-                let centre = [0, 1, 2].map(|k| corners.iter().map(|c| c[k]).sum::<f64>() / 3.0);
-                let (told, found) = (sizes.iter().sum::<f64>() / 3.0, field.at(centre).min(100.0));
-                assert!((told - found).abs() <= 0.25 * found, "{told} for {found} at {centre:?}");
+            let one = field.told(&[facet], 100.0, usize::MAX).expect("any number");
+            let fan = field.told(&needles, 100.0, usize::MAX).expect("any number");
+            assert!((10..1000).contains(&one.len()) && fan.len() <= one.len(), "{} and {}", one.len(), fan.len());
+            for x in over(facet, 500) {
+                let (found, told) = (field.at(x).min(100.0), told_at(&one, x).unwrap_or(100.0));
+                assert!((told - found).abs() <= 0.25 * found, "{told} for {found} at {x:?}");
             }
-            // What is left out has nothing below the largest size.
-            let least = sampled.iter().flat_map(|t| t.sizes).fold(f64::INFINITY, f64::min);
+            let least = one.iter().flat_map(|cube| cube.sizes).fold(f64::INFINITY, f64::min);
             assert!(least < 1.5, "{least}");
+            assert!(field.told(&[facet], 100.0, one.len() - 1).is_none(), "one less is not enough");
         }
-        assert!(SizeField::new(vec![], 0.4).sampled(std::iter::once(free(facet)), 100.0).is_empty());
+        assert_eq!(SizeField::new(vec![], 0.4).told(&[facet], 100.0, 0), Some(vec![]), "nothing is asked for");
+        assert_eq!(SizeField::new(places(9), 0.4).told(&[], 100.0, 0), Some(vec![]), "there is no surface");
     }
 
-    /// A triangle in which nothing is asked for.
-    fn free(corners: [Vec3; 3]) -> SizedTriangle {
-        SizedTriangle { corners, sizes: [f64::INFINITY; 3] }
-    }
-
-    /// On a facet whose corners ask for sizes a thousandth of its length, the places alone would allow more in between: what is
-    /// asked for there is a straight line. A place in the middle of it is found all the same, and no triangle more than both need.
     #[test]
-    fn between_corners_that_ask_for_sizes_these_are_interpolated() {
-        let facet =
-            SizedTriangle { corners: [[0.0; 3], [1000.0, 0.0, 0.0], [0.0, 800.0, 0.0]], sizes: [1.0, 2.0, 1.0] };
-        let mut places: Vec<SizedPlace> =
-            (0..3).map(|k| SizedPlace { at: facet.corners[k], size: facet.sizes[k], reach: 0.0 }).collect();
-        let asked = |x: Vec3| 1.0 + x[0] / 1000.0;
-        for count in 0..2 {
-            let pit = [300.0, 200.0, 0.0];
-            places.extend((0..count).map(|_| SizedPlace { at: pit, size: 0.01, reach: 0.0 }));
-            let sampled = SizeField::new(places.clone(), 0.4).sampled(std::iter::once(facet), 100.0);
-            assert!((1..2000).contains(&sampled.len()), "{} triangles", sampled.len());
-            for (at, size) in sampled.iter().flat_map(|t| t.corners.into_iter().zip(t.sizes)) {
-                let by_pit = if count == 0 { f64::INFINITY } else { 0.01 + 0.4 * distance(at, pit) };
-                let expected = asked(at).min(by_pit);
-                assert!((size - expected).abs() <= 1e-12 * expected, "{size} for {expected} at {at:?}");
-            }
-            let least = sampled.iter().flat_map(|t| t.sizes).fold(f64::INFINITY, f64::min);
-            assert!(if count == 0 { least == 1.0 } else { least < 0.02 }, "{least}");
-        }
+    fn a_triangle_meets_the_cubes_that_it_passes_through() {
+        let cube = SizedCube { low: [0.0; 3], side: 1.0, sizes: [1.0; 8] };
+        let moved = |by: f64| [[-1.0, 0.5, 0.5], [2.0, 0.5, 0.5], [2.0, 0.6, 3.0]].map(|x| [x[0], x[1], x[2] + by]);
+        assert!(meets(&cube, &moved(0.0)) && meets(&cube, &moved(0.5)), "through it, and along a side");
+        assert!(!meets(&cube, &moved(0.51)), "above it");
+        // Its box covers a corner of the cube, it does not.
+        assert!(!meets(&cube, &[[2.3, -0.2, 0.5], [-0.2, 2.3, 0.5], [2.3, 2.3, 0.5]]));
+        assert!(meets(&cube, &[[1.9, -0.2, 0.5], [-0.2, 1.9, 0.5], [1.9, 1.9, 0.5]]));
     }
 }

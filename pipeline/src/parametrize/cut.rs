@@ -44,6 +44,23 @@ const GOOD: f64 = 10.0;
 /// tests/interop, at 400, would fall into 40 each, and are well meshed as they are.
 const FEW: usize = 3;
 
+/// Charts of more triangles than this that no natural boundary follows are cut if they stretch more than [`EVEN`] freed from the
+/// disk, more than [`ROUNDED`] on it. What presses a thousandth of their area flat are fingers and folds: of brain_ch2 thirty such
+/// charts of up to 19,000 triangles took 87 s to untangle, and Gmsh did not end on them in ten minutes; cut, 2 s and a minute.
+const LARGE: usize = 500;
+const ROUNDED: f64 = 5.0;
+
+/// What all their parts shall not exceed. Of brain_ch2 parts at 5 have three times as many bad elements; airplane_27_holes, freed at
+/// 1.73, has one of gamma 0.096, which is 0.32 in five parts.
+const EVEN: f64 = 1.6;
+
+/// On the disk they fall into so many parts for each hole at most: a crumpled disk of 6,144 triangles (bent_disk), which would
+/// fall into 29, stays whole, and those of brain_ch2 take four to twelve.
+const SOME: usize = 12;
+
+/// From here on into [`MANY`]: whatever is as large takes long to untangle, and MeshAdapt minutes.
+const HUGE: usize = 6_500;
+
 /// The same for those that are torn. What was needed: 53 for three holes by menger_sponge3, whose long facets join
 /// across its openings, and 37 for four by the inside of imu_adis16480. A ring of fine triangles that falls into more
 /// (bent_disk) had better stay whole.
@@ -120,19 +137,33 @@ impl Cutter<'_> {
         let is_tangled = is_pierced && map.invalid_share(chart) > TANGLED;
         let is_uneven = matches!(map.boundary, BoundaryFound::Circle { why_none: Some(NoNatural::Uneven { .. }) });
         let bearable = if is_uneven { UNEVEN } else { STRETCHED };
-        if (stretch <= bearable && !is_tangled) || self.suits(chart, map.boundary, stretch, bearable)? == Suits::Natural
-        {
-            return Ok(None);
-        }
-        let most = chart.holes().len().max(1) * if stretch > TORN || is_tangled { MANY } else { FEW };
-        for bound in [GOOD, bearable] {
-            if let Some((parts, naturals)) = self.parts_within(chart, map, bound, most)?
-                && (bound == GOOD || naturals > 0)
-            {
-                return Ok(Some(self.joined(chart, parts)?));
+        let loops = chart.holes().len().max(1);
+        if (stretch > bearable || is_tangled) && self.suits(chart, map.boundary, stretch, bearable)? != Suits::Natural {
+            let most = loops * if stretch > TORN || is_tangled { MANY } else { FEW };
+            for bound in [GOOD, bearable] {
+                if let Some((parts, naturals)) = self.parts_within(chart, map, bound, most)?
+                    && (bound == GOOD || naturals > 0)
+                {
+                    return Ok(Some(self.joined(chart, parts)?));
+                }
             }
         }
         Ok(None)
+    }
+
+    /// The parts into which a chart of many triangles is to be cut, whose map is the best that was found; none where that stretches
+    /// little, or other rules are enough.
+    ///
+    /// # Errors
+    /// [`ChartError`].
+    pub(super) fn parts_of_large(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Mapped>>, ChartError> {
+        let stretch = map.conformal_p99(chart);
+        let Some(Large { bearable, per_hole }) = Large::of(chart, map.boundary, stretch) else { return Ok(None) };
+        if stretch <= bearable || self.suits(chart, map.boundary, stretch, bearable)? == Suits::Natural {
+            return Ok(None);
+        }
+        let parts = self.parts_within(chart, map, EVEN, chart.holes().len().max(1) * per_hole)?;
+        parts.map(|(parts, _)| self.joined(chart, parts)).transpose()
     }
 
     /// The two strips into which a ring falls, where both are unrolled without stretching, as the wall of a cylinder is; none
@@ -219,7 +250,7 @@ impl Cutter<'_> {
 
     /// Joins small parts of `chart` to neighbours as long as the map of both together suits a mesher: needles make cuts
     /// that leave single triangles, and meshers need an element for each of their corners. Every join leaves fewer parts.
-    fn joined(&self, chart: &Chart, parts: Vec<Mapped>) -> Result<Vec<Mapped>, ChartError> {
+    pub(super) fn joined(&self, chart: &Chart, parts: Vec<Mapped>) -> Result<Vec<Mapped>, ChartError> {
         let local = |face: &FaceId| chart.faces().partition_point(|f| f < face);
         let mut parts: Vec<Option<Mapped>> = parts.into_iter().map(Some).collect();
         let mut owner = vec![0; chart.faces().len()];
@@ -344,6 +375,32 @@ impl Cutter<'_> {
                 let scales = (!is_peeled).then(|| distortion::log_scales(chart, &map.certified_start));
                 decompose::split(chart, scales.as_deref(), &self.settings.decompose, self.monitor)
             }
+        }
+    }
+}
+
+/// The rule for charts of many triangles that no natural boundary follows.
+struct Large {
+    /// How much the map may stretch.
+    bearable: f64,
+    /// How many parts there may be for each hole, or for none.
+    per_hole: usize,
+}
+
+impl Large {
+    /// That for a chart with such a boundary, whose map stretches so much; none where other rules are enough.
+    fn of(chart: &Chart, found: BoundaryFound, stretch: f64) -> Option<Self> {
+        let triangles = chart.triangles().len();
+        match found {
+            BoundaryFound::Freed { .. } if triangles > LARGE => Some(Self { bearable: EVEN, per_hole: FEW }),
+            // What was asked for is no lack of another.
+            BoundaryFound::Circle { why_none: None } => None,
+            BoundaryFound::Circle { .. } if triangles > HUGE => Some(Self { bearable: ROUNDED, per_hole: MANY }),
+            // What stretches more has been tried to be cut already.
+            BoundaryFound::Circle { .. } if triangles > LARGE && stretch <= STRETCHED => {
+                Some(Self { bearable: ROUNDED, per_hole: SOME })
+            }
+            _ => None,
         }
     }
 }

@@ -233,8 +233,8 @@ impl ChartJob {
         };
         let mut mapped = Vec::with_capacity(parts.len());
         for (chart, maps) in parts {
-            let maps = freed_where_stretched(&chart, &settings, maps, monitor)?;
-            mapped.push(MappedChart { chart, settings, maps });
+            let mapped_parts = freed_or_cut(chart, &settings, maps, monitor)?;
+            mapped.extend(mapped_parts.into_iter().map(|(chart, maps)| MappedChart { chart, settings, maps }));
         }
         Ok(mapped)
     }
@@ -245,14 +245,18 @@ impl ChartJob {
         settings.check()?;
         let cutter = Cutter { settings: &settings, monitor };
         let mut mapped = Vec::new();
-        let mut waiting = vec![self.chart];
+        let mut is_split = false;
+        let mut waiting = vec![self.chart.clone()];
         while let Some(chart) = waiting.pop() {
             match cutter.attempt(&chart)? {
                 Attempt::Mapped(maps) => match cutter.parts(&chart, &maps)? {
                     Some(parts) => mapped.extend(parts),
                     None => mapped.push((chart, *maps)),
                 },
-                Attempt::Split(parts) => waiting.extend(parts.into_iter().rev()),
+                Attempt::Split(parts) => {
+                    is_split = true;
+                    waiting.extend(parts.into_iter().rev());
+                }
                 // Its map is what it is.
                 Attempt::Single => {
                     let maps = map_whole(&chart, settings.order, settings.decompose.boundary, f64::INFINITY, monitor)?;
@@ -260,7 +264,9 @@ impl ChartJob {
                 }
             }
         }
-        Ok(mapped)
+        // Joined parts have natural boundaries.
+        let may_join = is_split && settings.decompose.boundary == BoundaryShape::Natural;
+        if may_join { cutter.joined(&self.chart, mapped) } else { Ok(mapped) }
     }
 
     /// Maps, untangles and certifies the chart, split where it must be: [`Self::map`], and [`MappedChart::untangle`] for
@@ -448,6 +454,25 @@ pub(super) fn finer_maps(
     }
     let why_none = if let BoundaryFound::Circle { why_none } = boundary { why_none } else { None };
     map_to_disk(chart, order, why_none, most, monitor)
+}
+
+/// The chart with the best map that is found for it ([`freed_where_stretched`]), or its parts with theirs, where it has many
+/// triangles and all maps stretch it.
+pub(super) fn freed_or_cut(
+    chart: Chart,
+    settings: &ChartSettings,
+    maps: Maps,
+    monitor: &dyn Monitor,
+) -> Result<Vec<(Chart, Maps)>, ChartError> {
+    let maps = freed_where_stretched(&chart, settings, maps, monitor)?;
+    let Some(parts) = (Cutter { settings, monitor }).parts_of_large(&chart, &maps)? else {
+        return Ok(vec![(chart, maps)]);
+    };
+    let freed = |(chart, maps): (Chart, Maps)| {
+        let maps = freed_where_stretched(&chart, settings, maps, monitor)?;
+        Ok((chart, maps))
+    };
+    parts.into_iter().map(freed).collect()
 }
 
 /// The maps of a chart with another boundary, where that stretches less. Those on the circle for want of a natural one get a

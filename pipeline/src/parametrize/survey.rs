@@ -5,7 +5,7 @@
 //! there once: charts meet in the same nodes. Chart jobs are cut from the refined surface; maps of charts that came out
 //! as they were by themselves are kept, and so are those of charts that stayed as they are.
 
-use super::job::{ChartError, ChartJob, MapError, MappedChart, Maps, finer_maps, freed_where_stretched};
+use super::job::{ChartError, ChartJob, MapError, MappedChart, Maps, finer_maps, freed_or_cut};
 use crate::atlas::Chart;
 use crate::certified::BoundaryFound;
 use crate::decompose::{self, Illegal, assemble, with_outer};
@@ -97,12 +97,20 @@ impl ChartJob {
         let settings = self.settings;
         let mut parts = Vec::new();
         for (chart, maps) in self.mapped_parts(monitor)? {
-            let mut mapped = MappedChart { chart, settings, maps };
-            let finer = finer(&mapped, monitor)?;
-            if finer.is_none() {
-                mapped.maps = freed_where_stretched(&mapped.chart, &settings, mapped.maps, monitor)?;
+            let mapped = MappedChart { chart, settings, maps };
+            let finer_one = finer(&mapped, monitor)?;
+            if finer_one.is_some() {
+                parts.push(Part { mapped, finer: finer_one });
+                continue;
             }
-            parts.push(Part { mapped, finer });
+            let triangles = mapped.chart.triangles().len();
+            for (chart, maps) in freed_or_cut(mapped.chart, &settings, mapped.maps, monitor)? {
+                let mapped = MappedChart { chart, settings, maps };
+                // The whole has been looked at.
+                let is_part = mapped.chart.triangles().len() < triangles;
+                let finer = if is_part { finer(&mapped, monitor)? } else { None };
+                parts.push(Part { mapped, finer });
+            }
         }
         Ok(Surveyed { parts })
     }

@@ -16,8 +16,9 @@ use crate::vec3::{Vec3, distance};
 const ALONG: u32 = 4;
 
 /// From this share of the limit on it is kept barely: of a sphere with facets half as long as elements six of 2,406 exceeded it,
-/// and six others, after these alone had become smaller.
-pub const BARELY: f64 = 0.7;
+/// and six others, after these alone had become smaller. Of facets as long as elements (max_planck_decimated, at a thousandth of the
+/// diagonal) two elements were left after three times from 0.7 on, none from here.
+pub const BARELY: f64 = 0.5;
 
 /// An element from which the surface is too far away, or that is too far from it.
 #[derive(Clone, Copy, Debug, PartialEq)]

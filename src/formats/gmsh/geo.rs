@@ -1,6 +1,6 @@
 //! `remesh.geo`: a script that merges the atlas, sets sizes, and tells its reader what to change.
 
-use crate::result_files::{ATLAS_MSH as ATLAS, ENLARGED_MSH as ENLARGED, FINER, SIZES};
+use crate::result_files::{ATLAS_MSH as ATLAS, ENLARGED_MSH as ENLARGED, FINER, SIZES, SIZES_OF_ARRAY as ARRAY};
 
 /// What the script asks for where sizes vary.
 ///
@@ -11,11 +11,17 @@ use crate::result_files::{ATLAS_MSH as ATLAS, ENLARGED_MSH as ENLARGED, FINER, S
 /// With one pass of smoothing, which is the default, single elements stay flat: of face_bff one of 39,165, at gamma 0.07, comes and
 /// goes with the last digits of sizes. With two its least gamma is 0.25, those of 22 files are never lower, and Gmsh takes a third
 /// longer.
-fn varying(is_told: bool, heeds_finer: bool) -> String {
+fn varying(is_told: bool, has_array: bool, heeds_finer: bool) -> String {
     let mut text = String::from("\ncount = 0;\nsizes() = {};\n");
     if is_told {
-        text += "// Smaller elements in narrow places and spikes, and where they were asked for: a view tells sizes on the surface.\n";
+        text += "// Smaller elements in narrow places and spikes, and where they were asked for: a view tells sizes around the surface.\n";
         text += &view(&format!("\"{SIZES}\""), 1);
+    }
+    if has_array {
+        text += "// And what the array of the input asks for between its points.\n";
+        text += &view(&format!("\"{ARRAY}\""), 5);
+        // Where it asks for nothing, the nearest value counts otherwise.
+        text += "  Field[5].UseClosest = 0;\n";
     }
     if heeds_finer {
         text += "// And where planish check --deviation D --finer found earlier meshes too far from the surface.\n";
@@ -70,6 +76,8 @@ pub struct Script {
     pub algorithms: Algorithms,
     /// The order of the elements: 1 or 2.
     pub order: u8,
+    /// Whether an array of the input asks for sizes.
+    pub has_array: bool,
     /// Whether it heeds shorter edges that are asked for once meshes are looked at.
     pub heeds_finer: bool,
 }
@@ -85,7 +93,7 @@ pub struct Algorithms {
 
 /// The bytes of `remesh.geo`.
 pub fn remesh(script: &Script) -> Vec<u8> {
-    let Script { size, least, area, surfaces, curves, algorithms, order, heeds_finer } = script;
+    let Script { size, least, area, surfaces, curves, algorithms, order, has_array, heeds_finer } = script;
     let factor = algorithms.enlarged;
     format!(
         "// Remesh this surface through its certified maps:
@@ -131,7 +139,7 @@ Mesh.StlOneSolidPerSurface = 2;
         curved = curved(*order),
         times = if factor == 1.0 { String::new() } else { format!(" * {factor}") },
         but = if least.is_none() && !heeds_finer { "" } else { ", but where a view tells a smaller one" },
-        varying = if least.is_none() && !heeds_finer { String::new() } else { varying(least.is_some(), *heeds_finer) },
+        varying = if least.is_none() && !heeds_finer { String::new() } else { varying(least.is_some(), *has_array, *heeds_finer) },
         least = match least {
             _ if *heeds_finer => "0".to_owned(),
             Some(least) => format!("(size < {least} ? size : {least})"),
@@ -207,6 +215,7 @@ mod tests {
             curves: 1,
             algorithms,
             order: 1,
+            has_array: false,
             heeds_finer: false,
         };
         String::from_utf8(remesh(&script)).expect("UTF-8")

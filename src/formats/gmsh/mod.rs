@@ -11,7 +11,7 @@ mod read;
 
 pub use geo::{Algorithms, Script, remesh};
 pub use groups::Group;
-pub use pos::sizes;
+pub use pos::{SizedTriangle, on_cubes, on_triangles};
 pub use read::{AtlasError, read as read_atlas};
 
 use binary::Binary;
