@@ -54,6 +54,10 @@ const ROUNDED: f64 = 5.0;
 /// 1.73, has one of gamma 0.096, which is 0.32 in five parts.
 const EVEN: f64 = 1.6;
 
+/// Off the disk they fall into [`FEW`] for each hole, or into parts of so many triangles on average, before small ones are joined:
+/// airplane_27_holes needs that; a plate of genus 9 in two halves, whose maps stretch by 400 and are well meshed, stays whole.
+const PER_PART: usize = 300;
+
 /// On the disk they fall into so many parts for each hole at most: a crumpled disk of 6,144 triangles (bent_disk), which would
 /// fall into 29, stays whole, and those of brain_ch2 take four to twelve.
 const SOME: usize = 12;
@@ -158,11 +162,11 @@ impl Cutter<'_> {
     /// [`ChartError`].
     pub(super) fn parts_of_large(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Mapped>>, ChartError> {
         let stretch = map.conformal_p99(chart);
-        let Some(Large { bearable, per_hole }) = Large::of(chart, map.boundary, stretch) else { return Ok(None) };
+        let Some(Large { bearable, most }) = Large::of(chart, map.boundary, stretch) else { return Ok(None) };
         if stretch <= bearable || self.suits(chart, map.boundary, stretch, bearable)? == Suits::Natural {
             return Ok(None);
         }
-        let parts = self.parts_within(chart, map, EVEN, chart.holes().len().max(1) * per_hole)?;
+        let parts = self.parts_within(chart, map, EVEN, most)?;
         parts.map(|(parts, _)| self.joined(chart, parts)).transpose()
     }
 
@@ -383,22 +387,27 @@ impl Cutter<'_> {
 struct Large {
     /// How much the map may stretch.
     bearable: f64,
-    /// How many parts there may be for each hole, or for none.
-    per_hole: usize,
+    /// How many parts there may be.
+    most: usize,
 }
 
 impl Large {
     /// That for a chart with such a boundary, whose map stretches so much; none where other rules are enough.
     fn of(chart: &Chart, found: BoundaryFound, stretch: f64) -> Option<Self> {
         let triangles = chart.triangles().len();
+        let for_each_hole = |parts: usize| parts * chart.holes().len().max(1);
         match found {
-            BoundaryFound::Freed { .. } if triangles > LARGE => Some(Self { bearable: EVEN, per_hole: FEW }),
+            BoundaryFound::Freed { .. } if triangles > LARGE => {
+                Some(Self { bearable: EVEN, most: for_each_hole(FEW).max(triangles / PER_PART) })
+            }
             // What was asked for is no lack of another.
             BoundaryFound::Circle { why_none: None } => None,
-            BoundaryFound::Circle { .. } if triangles > HUGE => Some(Self { bearable: ROUNDED, per_hole: MANY }),
+            BoundaryFound::Circle { .. } if triangles > HUGE => {
+                Some(Self { bearable: ROUNDED, most: for_each_hole(MANY) })
+            }
             // What stretches more has been tried to be cut already.
             BoundaryFound::Circle { .. } if triangles > LARGE && stretch <= STRETCHED => {
-                Some(Self { bearable: ROUNDED, per_hole: SOME })
+                Some(Self { bearable: ROUNDED, most: for_each_hole(SOME) })
             }
             _ => None,
         }
