@@ -8,7 +8,7 @@ use crate::result_files::FINER;
 use crate::settings::USUAL_GRADATION;
 use crate::system::disk::{self, Disk, System};
 use planish_core::measure::sizes::{SizeField, SizedPlace, TOLD_UP_TO};
-use planish_core::soundness::{BARELY, Deviation, Triangulation};
+use planish_core::soundness::{BARELY, Deviation, TooFar, Triangulation};
 use std::path::Path;
 
 /// How far shorter edges reach around an element that is too far from the surface, in its longest edge: the next mesh has other
@@ -38,20 +38,20 @@ pub(super) fn ask(
         return Err(format!("{problem}: give a larger --deviation, or a smaller --size or --size-min"));
     };
     let least = report.settings.size_min.unwrap_or(0.0);
+    let place =
+        |found: &TooFar, size: f64| SizedPlace { at: found.at, size: size.max(least), reach: REACH * found.longest };
     let (mut places, mut held) = (Vec::new(), Vec::new());
     for found in &deviation.too_far {
         let size = 0.5 * found.longest;
         if size < least {
             held.push(Distance { distance: found.distance, at: found.at });
         }
-        places.push(SizedPlace { at: found.at, size: size.max(least), reach: REACH * found.longest });
+        places.push(place(found, size));
     }
     // Across the edges of facets the error falls with the length of edges: where the limit is kept barely, they shall keep it with
     // room to spare.
-    for found in &deviation.barely {
-        let size = found.longest * BARELY * deviation.limit / found.distance;
-        places.push(SizedPlace { at: found.at, size: size.max(least), reach: REACH * found.longest });
-    }
+    let barely = deviation.barely.iter();
+    places.extend(barely.map(|found| place(found, found.longest * BARELY * deviation.limit / found.distance)));
     let gradation = report.settings.gradation.unwrap_or(USUAL_GRADATION);
     let field = SizeField::new(places, gradation);
     let triangles: Vec<_> = (0..surface.triangles.len()).map(|t| surface.corners(t)).collect();

@@ -25,7 +25,7 @@ const CLOSE: f64 = 0.1;
 /// No place hides between the points that are looked at that asks for less than this share of the least that is found there.
 const HIDDEN: f64 = 1.0 / 1.5;
 
-/// Cubes are halved so often at most: to the accuracy of single numbers, as no size is told to more.
+/// Cubes are halved so often at most: from the length of a part to 1e-12 of it.
 const MAX_HALVINGS: u32 = 40;
 
 /// The cube around a surface begins so much before it, in its sides: facets of parts with flat sides would lie between cubes
@@ -122,8 +122,7 @@ impl SizeField {
         let mut told = Vec::new();
         let mut waiting: Vec<Cell> = self.whole(surface, most).into_iter().collect();
         while let Some(cell) = waiting.pop() {
-            let lattice = self.on_lattice(&cell, most);
-            if !self.is_told(&cell, &lattice, most) {
+            if let Some(lattice) = self.needed_lattice(&cell, most) {
                 waiting.extend((0..8).filter_map(|octant| self.octant(&cell, octant, &lattice, surface, most)));
             } else if cell.cube.sizes.iter().any(|size| *size < most) {
                 if told.len() == at_most {
@@ -148,12 +147,12 @@ impl SizeField {
             cube.sizes[corner] = self.at(cube.corner(corner)).min(most);
         }
         let all = |count: usize| (0..count as u32).collect::<Vec<u32>>();
-        let places = self.near(&cube, &all(self.places.len()), most);
-        (!places.is_empty()).then(|| Cell { cube, places, faces: all(surface.len()), halvings: 0 })
+        let (places, least) = self.near(&cube, &all(self.places.len()), most);
+        (!places.is_empty()).then(|| Cell { cube, places, least, faces: all(surface.len()), halvings: 0 })
     }
 
-    /// Those places that ask for the least at some point of a cube, or may do so.
-    fn near(&self, cube: &SizedCube, places: &[u32], most: f64) -> Vec<u32> {
+    /// Those places that ask for the least at some point of a cube, or may do so; and below what none of them asks in it.
+    fn near(&self, cube: &SizedCube, places: &[u32], most: f64) -> (Vec<u32>, f64) {
         let mut least = most;
         let mut near = Vec::with_capacity(places.len());
         for i in places {
@@ -165,7 +164,8 @@ impl SizeField {
                 least = least.min(place.asks(farthest, self.gradation));
             }
         }
-        near.iter().filter(|(_, at_least)| *at_least <= least).map(|(i, _)| *i).collect()
+        let below = near.iter().map(|(_, at_least)| *at_least).fold(most, f64::min);
+        (near.iter().filter(|(_, at_least)| *at_least <= least).map(|(i, _)| *i).collect(), below)
     }
 
     /// The field at the corners of a cube and in between: at 3 times 3 times 3 points, along x first.
@@ -183,19 +183,16 @@ impl SizeField {
         lattice
     }
 
-    /// Whether the sizes at the corners of a cube tell the field in it.
-    fn is_told(&self, cell: &Cell, lattice: &[f64; LATTICE], most: f64) -> bool {
-        let ask = |i: &u32| {
-            let place = &self.places[*i as usize];
-            place.asks(cell.cube.distances(place.at).0, self.gradation)
-        };
-        let least = cell.places.iter().map(ask).fold(most, f64::min);
-        if cell.cube.side <= least || cell.halvings == MAX_HALVINGS {
-            return true;
+    /// The field on the lattice of a cube; none where the sizes at its corners tell the field in it.
+    fn needed_lattice(&self, cell: &Cell, most: f64) -> Option<[f64; LATTICE]> {
+        if cell.cube.side <= cell.least || cell.halvings == MAX_HALVINGS {
+            return None;
         }
+        let lattice = self.on_lattice(cell, most);
         let found = lattice.iter().copied().fold(most, f64::min);
         let is_close = |(number, found): (usize, &f64)| (cell.told(number) - found).abs() <= CLOSE * found;
-        least >= HIDDEN * found && lattice.iter().enumerate().all(is_close)
+        let is_told = cell.least >= HIDDEN * found && lattice.iter().enumerate().all(is_close);
+        (!is_told).then_some(lattice)
     }
 
     /// An eighth of a cube, where the surface passes through it and places ask for less than `most` there.
@@ -215,12 +212,12 @@ impl SizeField {
             let [i, j, k] = [0, 1, 2].map(|k| from[k] + (corner >> k & 1));
             cube.sizes[corner] = lattice[i + 3 * j + 9 * k];
         }
-        let places = self.near(&cube, &cell.places, most);
+        let (places, least) = self.near(&cube, &cell.places, most);
         if places.is_empty() {
             return None;
         }
         let faces: Vec<u32> = cell.faces.iter().copied().filter(|f| meets(&cube, &surface[*f as usize])).collect();
-        (!faces.is_empty()).then_some(Cell { cube, places, faces, halvings: cell.halvings + 1 })
+        (!faces.is_empty()).then_some(Cell { cube, places, least, faces, halvings: cell.halvings + 1 })
     }
 }
 
@@ -242,6 +239,8 @@ struct Cell {
     cube: SizedCube,
     /// The places that tell the field in it.
     places: Vec<u32>,
+    /// None of them asks for less in it.
+    least: f64,
     /// The triangles that pass through it.
     faces: Vec<u32>,
     /// How often it was halved.

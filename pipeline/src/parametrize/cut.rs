@@ -46,12 +46,12 @@ const FEW: usize = 3;
 
 /// Charts of more triangles than this that no natural boundary follows are cut if they stretch more than [`EVEN`] freed from the
 /// disk, more than [`ROUNDED`] on it. What presses a thousandth of their area flat are fingers and folds: of brain_ch2 thirty such
-/// charts of up to 19,000 triangles took 87 s to untangle, and Gmsh did not end on them in ten minutes; cut, 2 s and a minute.
+/// charts of up to 19,000 triangles took 87 s to untangle, and Gmsh did not end on them in ten minutes; cut, 2 s and half a minute.
 const LARGE: usize = 500;
 const ROUNDED: f64 = 5.0;
 
 /// What all their parts shall not exceed. Of brain_ch2 parts at 5 have three times as many bad elements; airplane_27_holes, freed at
-/// 1.73, has one of gamma 0.096, which is 0.32 in five parts.
+/// 1.73, has one of gamma 0.096, and none below 0.41 in parts.
 const EVEN: f64 = 1.6;
 
 /// Off the disk they fall into [`FEW`] for each hole, or into parts of so many triangles on average, before small ones are joined:
@@ -141,9 +141,8 @@ impl Cutter<'_> {
         let is_tangled = is_pierced && map.invalid_share(chart) > TANGLED;
         let is_uneven = matches!(map.boundary, BoundaryFound::Circle { why_none: Some(NoNatural::Uneven { .. }) });
         let bearable = if is_uneven { UNEVEN } else { STRETCHED };
-        let loops = chart.holes().len().max(1);
         if (stretch > bearable || is_tangled) && self.suits(chart, map.boundary, stretch, bearable)? != Suits::Natural {
-            let most = loops * if stretch > TORN || is_tangled { MANY } else { FEW };
+            let most = for_each_hole(chart, if stretch > TORN || is_tangled { MANY } else { FEW });
             for bound in [GOOD, bearable] {
                 if let Some((parts, naturals)) = self.parts_within(chart, map, bound, most)?
                     && (bound == GOOD || naturals > 0)
@@ -383,6 +382,11 @@ impl Cutter<'_> {
     }
 }
 
+/// So many parts for each hole of a chart, or for one without.
+fn for_each_hole(chart: &Chart, parts: usize) -> usize {
+    parts * chart.holes().len().max(1)
+}
+
 /// The rule for charts of many triangles that no natural boundary follows.
 struct Large {
     /// How much the map may stretch.
@@ -395,19 +399,18 @@ impl Large {
     /// That for a chart with such a boundary, whose map stretches so much; none where other rules are enough.
     fn of(chart: &Chart, found: BoundaryFound, stretch: f64) -> Option<Self> {
         let triangles = chart.triangles().len();
-        let for_each_hole = |parts: usize| parts * chart.holes().len().max(1);
         match found {
             BoundaryFound::Freed { .. } if triangles > LARGE => {
-                Some(Self { bearable: EVEN, most: for_each_hole(FEW).max(triangles / PER_PART) })
+                Some(Self { bearable: EVEN, most: for_each_hole(chart, FEW).max(triangles / PER_PART) })
             }
             // What was asked for is no lack of another.
             BoundaryFound::Circle { why_none: None } => None,
             BoundaryFound::Circle { .. } if triangles > HUGE => {
-                Some(Self { bearable: ROUNDED, most: for_each_hole(MANY) })
+                Some(Self { bearable: ROUNDED, most: for_each_hole(chart, MANY) })
             }
             // What stretches more has been tried to be cut already.
             BoundaryFound::Circle { .. } if triangles > LARGE && stretch <= STRETCHED => {
-                Some(Self { bearable: ROUNDED, most: for_each_hole(SOME) })
+                Some(Self { bearable: ROUNDED, most: for_each_hole(chart, SOME) })
             }
             _ => None,
         }

@@ -245,8 +245,9 @@ impl ChartJob {
         settings.check()?;
         let cutter = Cutter { settings: &settings, monitor };
         let mut mapped = Vec::new();
-        let mut is_split = false;
-        let mut waiting = vec![self.chart.clone()];
+        // The chart itself, once it is split: it is the first that is looked at.
+        let mut whole = None;
+        let mut waiting = vec![self.chart];
         while let Some(chart) = waiting.pop() {
             match cutter.attempt(&chart)? {
                 Attempt::Mapped(maps) => match cutter.parts(&chart, &maps)? {
@@ -254,7 +255,7 @@ impl ChartJob {
                     None => mapped.push((chart, *maps)),
                 },
                 Attempt::Split(parts) => {
-                    is_split = true;
+                    whole.get_or_insert(chart);
                     waiting.extend(parts.into_iter().rev());
                 }
                 // Its map is what it is.
@@ -265,8 +266,10 @@ impl ChartJob {
             }
         }
         // Joined parts have natural boundaries.
-        let may_join = is_split && settings.decompose.boundary == BoundaryShape::Natural;
-        if may_join { cutter.joined(&self.chart, mapped) } else { Ok(mapped) }
+        match whole.filter(|_| settings.decompose.boundary == BoundaryShape::Natural) {
+            Some(whole) => cutter.joined(&whole, mapped),
+            None => Ok(mapped),
+        }
     }
 
     /// Maps, untangles and certifies the chart, split where it must be: [`Self::map`], and [`MappedChart::untangle`] for
@@ -480,7 +483,7 @@ pub(super) fn freed_or_cut(
 /// stretched all the same, as long triangles cannot follow it (of a menger sponge 290 of 3,200 above 100, of milk_truck one
 /// at 58,000, and Gmsh doubled a triangle there), one that is freed from that. This comes after cutting: parts with natural
 /// boundaries are better still.
-pub(super) fn freed_where_stretched(
+fn freed_where_stretched(
     chart: &Chart,
     settings: &ChartSettings,
     maps: Maps,

@@ -103,12 +103,12 @@ impl ChartJob {
                 parts.push(Part { mapped, finer: finer_one });
                 continue;
             }
-            let triangles = mapped.chart.triangles().len();
-            for (chart, maps) in freed_or_cut(mapped.chart, &settings, mapped.maps, monitor)? {
+            let found = freed_or_cut(mapped.chart, &settings, mapped.maps, monitor)?;
+            // The whole has been looked at.
+            let are_parts = found.len() > 1;
+            for (chart, maps) in found {
                 let mapped = MappedChart { chart, settings, maps };
-                // The whole has been looked at.
-                let is_part = mapped.chart.triangles().len() < triangles;
-                let finer = if is_part { finer(&mapped, monitor)? } else { None };
+                let finer = if are_parts { finer(&mapped, monitor)? } else { None };
                 parts.push(Part { mapped, finer });
             }
         }
