@@ -608,7 +608,7 @@ pub struct ExportReport {
     pub size: f64,
     /// Triangles of the linear triangulation.
     pub sub_triangles: usize,
-    /// Curved triangles that were split into other than four.
+    /// Curved triangles that were split into more than four.
     pub refined: usize,
     /// Charts that are handed over by a map with a boundary of its own.
     #[serde(default)]

@@ -18,6 +18,10 @@ pub(super) struct Nodes {
     edge: Vec<u32>,
     /// Per node that is no vertex, the nodes that it lies between.
     parents: Vec<[u32; 2]>,
+    /// Per edge of the surface, by the first copy: whether its middle is a node of the triangulations.
+    is_split: Vec<bool>,
+    /// How many of these there are.
+    split: usize,
     /// The nodes in the middle of halved parts of edges.
     halved: BTreeMap<(u32, u32), u32>,
     /// Per curve its edges, by the numbers of the first copies.
@@ -55,7 +59,8 @@ impl Nodes {
             [t[h.side()], t[(h.side() + 1) % 3]].map(|v| vertex[v.index()])
         };
         let parents = (0..edge.len()).map(ends).collect();
-        Self { vertex, edge, parents, halved: BTreeMap::new(), curve_edges }
+        let is_split = vec![false; edge.len()];
+        Self { vertex, edge, parents, is_split, split: 0, halved: BTreeMap::new(), curve_edges }
     }
 
     /// The node of a vertex of the surface.
@@ -75,9 +80,36 @@ impl Nodes {
         vertices.chain(middles).collect()
     }
 
-    /// How many parts of edges were halved.
+    /// Makes the middle of an edge of the surface a node of the triangulations.
+    pub(super) fn split(&mut self, mesh: &SurfaceMesh, h: HalfEdgeId) {
+        let edge = self.edge[mesh.edges().edge(h).index()] as usize;
+        self.split += usize::from(!std::mem::replace(&mut self.is_split[edge], true));
+    }
+
+    /// The node in the middle of an edge of the surface, where that is one of the triangulations.
+    pub(super) fn split_at(&self, mesh: &SurfaceMesh, h: HalfEdgeId) -> Option<u32> {
+        let edge = self.edge[mesh.edges().edge(h).index()];
+        self.is_split[edge as usize].then_some(self.vertex.len() as u32 + edge)
+    }
+
+    /// How many edges and parts of edges were halved.
     pub(super) fn halved(&self) -> usize {
-        self.halved.len()
+        self.split + self.halved.len()
+    }
+
+    /// Whether each edge of a curve is exactly its two halves.
+    pub(super) fn is_in_halves(&self, curve: &Curve) -> bool {
+        let edges = &self.curve_edges[curve.id().index()];
+        edges.iter().all(|edge| self.is_split[*edge as usize]) && !self.is_cut(curve)
+    }
+
+    /// Whether a half of an edge of a curve was halved.
+    pub(super) fn is_cut(&self, curve: &Curve) -> bool {
+        let edges = &self.curve_edges[curve.id().index()];
+        curve.vertices().windows(2).zip(edges).any(|(ends, edge)| {
+            let middle = self.vertex.len() as u32 + edge;
+            ends.iter().any(|v| self.middle(self.at_vertex(*v), middle).is_some())
+        })
     }
 
     /// The node in the middle of the part of an edge between two nodes, where it was halved.
@@ -120,10 +152,12 @@ impl Nodes {
         let mut nodes = vec![self.at_vertex(curve.vertices()[0])];
         for (w, edge) in curve.vertices().windows(2).zip(&self.curve_edges[curve.id().index()]) {
             let [a, b] = [w[0], w[1]].map(|v| self.at_vertex(v));
-            let middle = self.vertex.len() as u32 + edge;
-            self.push_inside(a, middle, &mut nodes);
-            nodes.push(middle);
-            self.push_inside(middle, b, &mut nodes);
+            if self.is_split[*edge as usize] {
+                let middle = self.vertex.len() as u32 + edge;
+                self.push_inside(a, middle, &mut nodes);
+                nodes.push(middle);
+                self.push_inside(middle, b, &mut nodes);
+            }
             nodes.push(b);
         }
         nodes

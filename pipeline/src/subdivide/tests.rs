@@ -1,6 +1,8 @@
 use super::*;
+use crate::atlas::Chart;
 use crate::certified::CertifiedChart;
-use crate::certify::{PlanarMap, prove};
+use crate::certify::{PlanarMap, parts, prove};
+use crate::grid::orientation;
 use crate::mesh::TriangleSoup;
 use crate::parametrize::parametrize_chart;
 use crate::seams::tests::{labelled, sector};
@@ -30,6 +32,11 @@ impl Sample {
         let straight = vec![None; charts.len()];
         let size = Some(f64::MIN_POSITIVE);
         Self { atlas: CertifiedAtlas::gather(mesh, charts, size).expect("an atlas"), straight }
+    }
+
+    /// Whether all charts are so small that none of their triangles stays whole.
+    fn is_small(&self) -> bool {
+        self.atlas.charts().iter().all(|c| c.chart().triangles().len() < refine::FEW)
     }
 
     fn subdivide(&self) -> Result<LinearAtlas, Error> {
@@ -97,7 +104,8 @@ fn charts_become_triangulations_that_share_their_seams() {
     ];
     for sample in samples {
         let linear = sample.verified();
-        assert!(linear.triangle_count() >= 4 * sample.atlas.mesh().triangles().len());
+        let triangles = sample.atlas.mesh().triangles().len();
+        assert!(linear.triangle_count() >= triangles * if sample.is_small() { 4 } else { 1 });
         assert_eq!((linear.moved(), linear.linear_charts()), (0, &[][..]));
     }
 }
@@ -130,6 +138,59 @@ fn a_chart_is_handed_over_by_its_projection_where_there_is_one() {
         let first = scale(&chart.triangles()[0]);
         assert!(chart.triangles().iter().all(|t| (scale(t) / first - 1.0).abs() < 1e-9), "the plane as it is");
     }
+}
+
+#[test]
+fn triangles_stay_whole_where_the_map_is_as_good_as_linear() {
+    let sample = Sample::new(&shapes::sphere(40), |p| u32::from(p[2] > 0.0));
+    let linear = sample.verified();
+    let (triangles, parts) = (sample.atlas.mesh().triangles().len(), linear.triangle_count());
+    assert!(parts < 2 * triangles, "{parts} of {triangles}");
+    // The differential of a whole triangle is nearly that of the curved one, at every corner, in every direction.
+    let mut whole = 0;
+    for (chart, certified) in linear.charts().iter().zip(sample.atlas.charts()) {
+        let map = certified.map().map();
+        for (t, face) in chart.triangles().iter().zip(chart.faces()) {
+            let cell = map.cells[*face as usize];
+            if !cell[..3].iter().all(|n| t.contains(n)) {
+                continue;
+            }
+            whole += 1;
+            let nodes = cell.map(|n| map.nodes[n as usize].uv());
+            let difference = differential_beside_linear(nodes);
+            assert!(difference <= 8.0 / 32.0, "{difference}");
+        }
+    }
+    assert!(whole > triangles / 2, "{whole} of {triangles}");
+}
+
+/// The largest Frobenius norm of D F L^-1 - 1 at the corners, F being the quadratic map with these nodes, and L the linear one
+/// between its corners.
+fn differential_beside_linear(nodes: [[f64; 2]; 6]) -> f64 {
+    // Derivatives of the six shape functions by x and y, where the corners lie at (0, 0), (1, 0), (0, 1).
+    let derivatives = |x: f64, y: f64| {
+        let z = 1.0 - x - y;
+        let by_x = [1.0 - 4.0 * z, 4.0 * x - 1.0, 0.0, 4.0 * (z - x), 4.0 * y, -4.0 * y];
+        let by_y = [1.0 - 4.0 * z, 0.0, 4.0 * y - 1.0, -4.0 * x, 4.0 * x, 4.0 * (z - y)];
+        [by_x, by_y]
+    };
+    let [a, b, c] = [0, 1, 2].map(|k| nodes[k]);
+    let linear = [[b[0] - a[0], c[0] - a[0]], [b[1] - a[1], c[1] - a[1]]];
+    let det = linear[0][0] * linear[1][1] - linear[0][1] * linear[1][0];
+    let inverse = [[linear[1][1], -linear[0][1]], [-linear[1][0], linear[0][0]]].map(|row| row.map(|v| v / det));
+    let at = |(x, y): (f64, f64)| {
+        let by = derivatives(x, y);
+        let d = [0, 1].map(|i| by.map(|w| nodes.iter().zip(w).map(|(n, w)| w * n[i]).sum::<f64>()));
+        let mut sum = 0.0;
+        for i in 0..2 {
+            for j in 0..2 {
+                let product = d[i][0] * inverse[0][j] + d[i][1] * inverse[1][j];
+                sum += (product - f64::from(u8::from(i == j))).powi(2);
+            }
+        }
+        sum.sqrt()
+    };
+    [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].into_iter().map(at).fold(0.0, f64::max)
 }
 
 /// A valid curved triangle whose straight part between its third corner and the middles beside it is inverted: the
@@ -218,9 +279,12 @@ fn charts_too_thin_to_be_halved_make_their_neighbours_plainer() {
 
 /// How many parts of the first chart are inverted when every triangle is split into four.
 fn quartered_inverted_parts(sample: &Sample) -> usize {
-    let (nodes, first) = (Nodes::new(&sample.atlas), &sample.atlas.charts()[0]);
-    let chart = quartered(sample.atlas.mesh(), first.chart(), first.map().map(), &nodes);
-    chart.triangles.iter().filter(|t| !chart.turns_left(**t)).count()
+    let map = sample.atlas.charts()[0].map().map();
+    let turns_left = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|n| map.nodes[n as usize]);
+        orientation(a, b, c) > 0
+    };
+    map.cells.iter().flat_map(|c| parts(*c)).filter(|t| !turns_left(t)).count()
 }
 
 #[test]
@@ -229,10 +293,8 @@ fn refinement_that_may_not_go_deep_enough_names_the_triangle() {
     let charts = sample.atlas.charts();
     let maps: Vec<&PlanarMap> = charts.iter().map(|c| c.map().map()).collect();
     let mut nodes = Nodes::new(&sample.atlas);
-    let quarters = |(c, m): (&CertifiedChart, &&PlanarMap)| quartered(sample.atlas.mesh(), c.chart(), m, &nodes);
-    let mut linear: Vec<LinearChart> = charts.iter().zip(&maps).map(quarters).collect();
-    let found = refine::refine(0, &sample.atlas, &maps, &mut nodes, &mut linear);
-    assert_eq!(found, Err(vec![Inverted { chart: ChartId(1), face: FaceId(0), depth: 1, halved: 0 }]));
+    let found = refine::triangulate(0, &sample.atlas, &maps, &[false; 4], &mut nodes);
+    assert_eq!(found.err(), Some(vec![Inverted { chart: ChartId(1), face: FaceId(0), depth: 1, halved: 0 }]));
 }
 
 #[test]
@@ -258,10 +320,11 @@ fn triangles_without_a_normal_get_one_and_others_stay() {
 /// How many parts of the first chart have no area when every triangle is split into four.
 fn flat_quartered_parts(sample: &Sample) -> usize {
     let (nodes, first) = (Nodes::new(&sample.atlas), &sample.atlas.charts()[0]);
-    let chart = quartered(sample.atlas.mesh(), first.chart(), first.map().map(), &nodes);
+    let of_chart = nodes.of_chart(sample.atlas.mesh(), first.chart());
     let points = nodes.positions(sample.atlas.mesh());
-    let corners = |t: &[u32; 3]| t.map(|n| points[chart.nodes[n as usize] as usize]);
-    chart.triangles.iter().filter(|t| crate::vec3::triangle_area(corners(t)) == 0.0).count()
+    let corners = |t: &[u32; 3]| t.map(|n| points[of_chart[n as usize] as usize]);
+    let quarters: Vec<[u32; 3]> = first.map().map().cells.iter().flat_map(|c| parts(*c)).collect();
+    quarters.iter().filter(|t| crate::vec3::triangle_area(corners(t)) == 0.0).count()
 }
 
 #[test]
