@@ -222,15 +222,15 @@ fn warn_if_unsolved(certified: &CertifiedChart) {
 /// Encodes what ParaView shows.
 fn encode(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Files, Reason> {
     let mut files = vec![
-        (result_files::SURFACE.to_owned(), vtu::surface(atlas, labels).map_err(not_encoded)?),
-        (result_files::PARAM.to_owned(), vtu::param(atlas, labels).map_err(not_encoded)?),
+        (result_files::SURFACE.to_owned(), vtu::surface(atlas, labels)),
+        (result_files::PARAM.to_owned(), vtu::param(atlas, labels)),
         (result_files::SEAMS.to_owned(), vtp::seams(atlas, labels).map_err(not_encoded)?),
     ];
     let mut parts = Vec::new();
     for (label, Label { name, group, .. }) in labels.iter().enumerate() {
         let file = result_files::surface_of(group);
         parts.push(vtm::Block::file(name, &file));
-        files.push((file, vtu::part(atlas, labels, label).map_err(not_encoded)?));
+        files.push((file, vtu::part(atlas, labels, label)));
     }
     let surface = match parts.len() {
         0 => vtm::Content::File(result_files::SURFACE.to_owned()),
@@ -250,7 +250,7 @@ fn encode_also(also: Also, atlas: &CertifiedAtlas, labels: &[Label]) -> Result<(
     let content = match also {
         Also::Obj => surface_obj::surface(atlas, labels),
         Also::Glb => glb::surface(atlas, labels).map_err(|e| e.reason())?,
-        Also::Welded => welded::surface(atlas, labels).map_err(not_encoded)?,
+        Also::Welded => welded::surface(atlas, labels),
     };
     Ok((also_file(also).to_owned(), content))
 }

@@ -6,6 +6,7 @@
 //! triangles and quadrilaterals give their corners: edges are
 //! taken to be straight. [`vtu`], [`vtp`] and [`vtm`] are what planish writes for ParaView.
 
+mod appended;
 mod attributes;
 mod cell;
 mod cell_labels;

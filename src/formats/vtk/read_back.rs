@@ -27,8 +27,9 @@ const FIELDS: [Field; 9] = [
     Field::OfCells("area_scale"),
 ];
 
-/// The types of indices: unsigned in files of earlier versions. What is negative is too large for an index, read as unsigned.
-const INDICES: [Scalar; 2] = [Scalar::I64, Scalar::U64];
+/// The types of indices: of 32 bits where these suffice; unsigned in files of earlier versions. What is negative is too large
+/// for an index, read as unsigned.
+const INDICES: [Scalar; 3] = [Scalar::I32, Scalar::I64, Scalar::U64];
 
 /// The field that tells the charts of a surface.
 const CHART: [Field; 1] = [Field::OfCells("chart")];
@@ -92,14 +93,14 @@ impl Columns<'_, '_> {
 
     /// The nodes of the cells, all of which must be 6-node triangles of existing points.
     fn cells(&mut self, points: u64, count: u64) -> Result<Vec<[u32; 6]>, VtuError> {
-        let types = self.numbers(Role::Types, "Cells", &[Scalar::U8], count, u8::from_le_bytes)?;
-        let ends = self.numbers(Role::Offsets(Section::Cells), "Cells", &INDICES, count, u64::from_le_bytes)?;
+        let types = self.numbers(Role::Types, "Cells", &[Scalar::U8], count, |bytes| bytes[0])?;
+        let ends = self.numbers(Role::Offsets(Section::Cells), "Cells", &INDICES, count, whole)?;
         let are_sixes = ends.into_iter().zip(1..).all(|(end, i)| end == 6 * i);
         let are_quadratic = types.into_iter().all(|kind| kind == cell::QUADRATIC_TRIANGLE);
         let Some(all) = count.checked_mul(6).filter(|_| are_sixes && are_quadratic) else {
             return Err(VtuError::Content("Cells"));
         };
-        let nodes = self.numbers(Role::Connectivity(Section::Cells), "Cells", &INDICES, all, node)?;
+        let nodes = self.numbers(Role::Connectivity(Section::Cells), "Cells", &INDICES, all, |n| node(whole(n)))?;
         if nodes.iter().any(|node| u64::from(*node) >= points) {
             return Err(VtuError::Content("Cells"));
         }
@@ -107,7 +108,10 @@ impl Columns<'_, '_> {
     }
 
     fn fields(&mut self, count: u64) -> Result<Vec<CellFields>, VtuError> {
-        let mut field = |name| self.doubles::<1>(Role::Field(Field::OfCells(name)), name, count);
+        let mut field = |name| {
+            let floats = [Scalar::F32, Scalar::F64];
+            self.numbers(Role::Field(Field::OfCells(name)), name, &floats, count, float)
+        };
         let min = field("det_min")?;
         let max = field("det_max")?;
         let ratio = field("jacobian_ratio")?;
@@ -117,11 +121,11 @@ impl Columns<'_, '_> {
         let mut fields = Vec::with_capacity(min.len());
         for i in 0..min.len() {
             fields.push(CellFields {
-                det_min: min[i][0],
-                det_max: max[i][0],
-                jacobian_ratio: ratio[i][0],
-                conformal_distortion: distortion[i][0],
-                area_scale: scale[i][0],
+                det_min: min[i],
+                det_max: max[i],
+                jacobian_ratio: ratio[i],
+                conformal_distortion: distortion[i],
+                area_scale: scale[i],
             });
         }
         Ok(fields)
@@ -134,35 +138,48 @@ impl Columns<'_, '_> {
         count: u64,
     ) -> Result<Vec<[f64; N]>, VtuError> {
         let numbers = count.checked_mul(N as u64).ok_or(VtuError::Content(name))?;
-        let numbers = self.numbers(role, name, &[Scalar::F64], numbers, f64::from_le_bytes)?;
+        let numbers = self.numbers(role, name, &[Scalar::F64], numbers, float)?;
         Ok(numbers.as_chunks().0.to_vec())
     }
 
     fn integers(&mut self, field: Field, name: &'static str, count: u64) -> Result<Vec<i32>, VtuError> {
-        self.numbers(Role::Field(field), name, &[Scalar::I32], count, i32::from_le_bytes)
+        self.numbers(Role::Field(field), name, &[Scalar::I32], count, |bytes| whole(bytes) as i32)
     }
 
-    /// Exactly so many numbers of one of these types, which have one size, each made of its bytes by `number`.
-    fn numbers<const SIZE: usize, T>(
+    /// Exactly so many numbers of one of these types, each made of its bytes by `number`.
+    fn numbers<T>(
         &mut self,
         role: Role,
         name: &'static str,
         scalars: &[Scalar],
         count: u64,
-        number: impl Fn([u8; SIZE]) -> T,
+        number: impl Fn(&[u8]) -> T,
     ) -> Result<Vec<T>, VtuError> {
         let array =
             self.piece.array(role).filter(|array| scalars.contains(&array.scalar)).ok_or(VtuError::Content(name))?;
         let bytes = self.arrays.bytes_of(&array, name)?;
-        let (numbers, rest) = bytes.as_chunks::<SIZE>();
-        if !rest.is_empty() || numbers.len() as u64 != count {
+        let numbers = bytes.chunks_exact(array.scalar.size());
+        if !numbers.remainder().is_empty() || numbers.len() as u64 != count {
             return Err(VtuError::Content(name));
         }
-        Ok(numbers.iter().map(|bytes| number(*bytes)).collect())
+        Ok(numbers.map(number).collect())
     }
 }
 
-/// A node by its bytes. What is no node is the largest number: a file has fewer points.
-fn node(bytes: [u8; 8]) -> u32 {
-    u32::try_from(u64::from_le_bytes(bytes)).unwrap_or(u32::MAX)
+/// A whole number of up to 64 bits, the lowest byte first; as unsigned.
+fn whole(bytes: &[u8]) -> u64 {
+    bytes.iter().rfold(0, |number, byte| number << 8 | u64::from(*byte))
+}
+
+/// A float or a double.
+fn float(bytes: &[u8]) -> f64 {
+    match bytes.len() {
+        4 => f64::from(f32::from_bits(whole(bytes) as u32)),
+        _ => f64::from_bits(whole(bytes)),
+    }
+}
+
+/// What is no node is the largest number: a file has fewer points.
+fn node(number: u64) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
 }

@@ -1,6 +1,6 @@
 //! `seams.vtp`: the curves between charts as polylines, and corners as points, by `vtkio`.
 
-use super::vtu::{COMPRESSOR, sign_indices, tag_of};
+use super::vtu::tag_of;
 use crate::formats::Label;
 use planish_core::CertifiedAtlas;
 use planish_core::mesh::SurfaceMesh;
@@ -9,6 +9,10 @@ use planish_core::topology::VertexId;
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, DataArray, DataSet, IOBuffer, PolyDataPiece, Version, VertexNumbers, Vtk,
 };
+use vtkio::xml::Compressor;
+
+/// What every reader can unpack: meshio does not know LZ4.
+const COMPRESSOR: Compressor = Compressor::ZLib;
 
 /// `vtkio` cannot write the file.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +59,20 @@ pub fn seams(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Vec<u8>, VtpErr
     file.write(&mut bytes).map_err(|e| VtpError(e.to_string()))?;
     sign_indices(&mut bytes);
     Ok(bytes)
+}
+
+/// Calls the indices of a file signed, as VTK does and writes them: of unsigned ones meshio makes floating-point numbers, with
+/// which numpy takes no points. (`vtkio` writes unsigned ones; the bits are the same.)
+fn sign_indices(bytes: &mut Vec<u8>) {
+    for name in ["connectivity", "offsets"] {
+        let unsigned = format!("type=\"UInt64\" Name=\"{name}\"");
+        let signed = format!("type=\"Int64\" Name=\"{name}\"");
+        let found: Vec<usize> = memchr::memmem::find_iter(bytes, unsigned.as_bytes()).collect();
+        // From the last on, so that the others stay where they are.
+        for at in found.into_iter().rev() {
+            bytes.splice(at..at + unsigned.len(), signed.bytes());
+        }
+    }
 }
 
 /// The number of a vertex in the input; -2 for one that was made.

@@ -1,5 +1,6 @@
-//! surface.vtu and param.vtu: written for ParaView by `vtkio`, and read again by `planish check`.
+//! surface.vtu and param.vtu: written for ParaView, and read again by `planish check`.
 
+use super::appended::{self, Array};
 use super::error::VtkError;
 pub use super::read_back::{read, read_shape};
 use super::vtm::escape;
@@ -12,21 +13,10 @@ use planish_core::vec3::midpoint;
 use planish_core::{CertifiedAtlas, CertifiedChart};
 use std::collections::BTreeSet;
 use std::fmt::Write;
-use vtkio::model::{
-    Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, IOBuffer, UnstructuredGridPiece, Version,
-    VertexNumbers, Vtk,
-};
-use vtkio::xml::Compressor;
-
-/// What every reader can unpack: meshio does not know LZ4.
-pub(super) const COMPRESSOR: Compressor = Compressor::ZLib;
-
-/// Why a file cannot be written or read.
+use std::iter::repeat_n;
+/// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum VtuError {
-    /// `vtkio` says why.
-    #[error("{0}")]
-    Library(String),
     /// The file is no VTU file, or a damaged one.
     #[error(transparent)]
     Damaged(#[from] VtkError),
@@ -68,33 +58,24 @@ pub struct Shape {
 }
 
 /// The bytes of surface.vtu. Cells have their label's tag, where there are labels, and the names of these are told beside.
-///
-/// # Errors
-/// [`VtuError::Library`].
-pub fn surface(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Vec<u8>, VtuError> {
+pub fn surface(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<u8> {
     let charts: Vec<_> = atlas.charts().iter().collect();
-    encode(atlas, &charts, labels, "planish surface", |certified, node, _| position(certified.chart(), node))
+    encode(atlas, &charts, labels, |certified, node, _| position(certified.chart(), node))
 }
 
 /// The same of one label alone, counted from 0.
-///
-/// # Errors
-/// [`VtuError::Library`].
-pub fn part(atlas: &CertifiedAtlas, labels: &[Label], label: usize) -> Result<Vec<u8>, VtuError> {
+pub fn part(atlas: &CertifiedAtlas, labels: &[Label], label: usize) -> Vec<u8> {
     let is_part = |c: &&CertifiedChart| label_index(atlas, c.id(), labels) == Some(label);
     let charts: Vec<_> = atlas.charts().iter().filter(is_part).collect();
-    encode(atlas, &charts, labels, "planish surface", |certified, node, _| position(certified.chart(), node))
+    encode(atlas, &charts, labels, |certified, node, _| position(certified.chart(), node))
 }
 
 /// The bytes of param.vtu: the same cells in the parametric plane, charts beside each other, each in its own size (see
 /// [`layout`]).
-///
-/// # Errors
-/// [`VtuError::Library`].
-pub fn param(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Vec<u8>, VtuError> {
+pub fn param(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<u8> {
     let places = layout(atlas.charts());
     let charts: Vec<_> = atlas.charts().iter().collect();
-    encode(atlas, &charts, labels, "planish parametric plane", |certified, _, uv| places[certified.id().index()].of(uv))
+    encode(atlas, &charts, labels, |certified, _, uv| places[certified.id().index()].of(uv))
 }
 
 /// The position of a node in space: that of a vertex, or the middle of a straight edge.
@@ -113,75 +94,37 @@ fn encode(
     atlas: &CertifiedAtlas,
     charts: &[&CertifiedChart],
     labels: &[Label],
-    title: &str,
     place: impl Fn(&CertifiedChart, usize, [f64; 2]) -> [f64; 3],
-) -> Result<Vec<u8>, VtuError> {
-    let mut points: Vec<f64> = Vec::new();
-    let mut connectivity: Vec<u64> = Vec::new();
+) -> Vec<u8> {
+    let mut cells: Vec<u32> = Vec::with_capacity(6 * charts.iter().map(|c| c.fields().len()).sum::<usize>());
+    let mut count = 0;
     for certified in charts {
-        let base = points.len() as u64 / 3;
         let map = certified.map().map();
-        for (node, p) in map.nodes.iter().enumerate() {
-            points.extend(place(certified, node, p.uv()));
-        }
-        connectivity.extend(map.cells.iter().flatten().map(|n| base + u64::from(*n)));
+        cells.extend(map.cells.iter().flatten().map(|n| count as u32 + n));
+        count += map.nodes.len();
     }
-    let data = Attributes { point: point_fields(charts), cell: cell_fields(atlas, charts, labels) };
-    write(title, labels, points, connectivity, data)
-}
-
-/// The bytes of a file with these triangles of six nodes, and the names of labels.
-pub(super) fn write(
-    title: &str,
-    labels: &[Label],
-    points: Vec<f64>,
-    connectivity: Vec<u64>,
-    data: Attributes,
-) -> Result<Vec<u8>, VtuError> {
-    let cells = connectivity.len() / 6;
-    let offsets = (1..=cells as u64).map(|i| 6 * i).collect();
-    let vtk = Vtk {
-        version: Version::new_xml(1, 0),
-        byte_order: ByteOrder::LittleEndian,
-        title: title.to_owned(),
-        file_path: None,
-        data: DataSet::inline(UnstructuredGridPiece {
-            points: points.into(),
-            cells: Cells {
-                cell_verts: VertexNumbers::XML { connectivity, offsets },
-                types: vec![CellType::QuadraticTriangle; cells],
-            },
-            data,
-        }),
+    let place = &place;
+    let places = charts.iter().flat_map(|certified| {
+        let nodes = certified.map().map().nodes.iter().enumerate();
+        nodes.flat_map(move |(node, p)| place(certified, node, p.uv()))
+    });
+    let grid = appended::Grid {
+        count,
+        points: Array::doubles("Points", 3, places),
+        cells,
+        of_points: point_fields(charts),
+        of_cells: cell_fields(atlas, charts, labels),
+        field_data: names_of_labels(labels),
     };
-    let library = |e: &dyn std::fmt::Display| VtuError::Library(e.to_string());
-    let mut bytes = Vec::new();
-    let file = vtk.try_into_xml_format(COMPRESSOR, 1).map_err(|e| library(&e))?;
-    file.write(&mut bytes).map_err(|e| library(&e))?;
-    sign_indices(&mut bytes);
-    if !labels.is_empty() {
-        add_field_data(&mut bytes, &names_of_labels(labels))?;
-    }
-    Ok(bytes)
-}
-
-/// Calls the indices of a file signed, as VTK does and writes them: of unsigned ones meshio makes floating-point numbers, with
-/// which numpy takes no points. (`vtkio` writes unsigned ones; the bits are the same.)
-pub(super) fn sign_indices(bytes: &mut Vec<u8>) {
-    for name in ["connectivity", "offsets"] {
-        let unsigned = format!("type=\"UInt64\" Name=\"{name}\"");
-        let signed = format!("type=\"Int64\" Name=\"{name}\"");
-        let found: Vec<usize> = memchr::memmem::find_iter(bytes, unsigned.as_bytes()).collect();
-        // From the last on, so that the others stay where they are.
-        for at in found.into_iter().rev() {
-            bytes.splice(at..at + unsigned.len(), signed.bytes());
-        }
-    }
+    grid.into_bytes()
 }
 
 /// The field data that name labels: for each an array of its name, with its tag and dimension, as meshio tells groups of MSH
-/// files. (Arrays of strings would name them better, but meshio refuses files that have any; `vtkio` writes no field data.)
-fn names_of_labels(labels: &[Label]) -> String {
+/// files. (Arrays of strings would name them better, but meshio refuses files that have any.)
+pub(super) fn names_of_labels(labels: &[Label]) -> String {
+    if labels.is_empty() {
+        return String::new();
+    }
     let mut arrays = String::new();
     let mut taken = BTreeSet::new();
     for Label { tag, name, group } in labels {
@@ -195,62 +138,45 @@ fn names_of_labels(labels: &[Label]) -> String {
     format!("<FieldData>{arrays}</FieldData>")
 }
 
-/// Puts field data in front of the first piece.
-fn add_field_data(bytes: &mut Vec<u8>, field_data: &str) -> Result<(), VtuError> {
-    let at = memchr::memmem::find(bytes, b"<Piece").ok_or(VtuError::Content("Piece"))?;
-    bytes.splice(at..at, field_data.bytes());
-    Ok(())
-}
-
-pub(super) fn array(name: &str, components: u32, data: impl Into<IOBuffer>) -> Attribute {
-    Attribute::DataArray(DataArray::new(name, components).with_data(data))
-}
-
 /// `uv` and `vertex` of every node.
-fn point_fields(charts: &[&CertifiedChart]) -> Vec<Attribute> {
-    let mut uv: Vec<f64> = Vec::new();
-    let mut vertex: Vec<i32> = Vec::new();
-    for certified in charts {
-        let (chart, nodes) = (certified.chart(), &certified.map().map().nodes);
-        uv.extend(nodes.iter().flat_map(|p| p.uv()));
+fn point_fields(charts: &[&CertifiedChart]) -> Vec<Array> {
+    let uv = charts.iter().flat_map(|certified| certified.map().map().nodes.iter().flat_map(|p| p.uv()));
+    let vertex = charts.iter().flat_map(|certified| {
+        let chart = certified.chart();
         let vertices = (0..chart.vertices().len()).map(VertexId::at);
-        vertex.extend(vertices.map(|v| chart.input_vertex(v).map_or(-2, |w| w as i32)));
-        vertex.resize(uv.len() / 2, -1);
-    }
-    vec![array("uv", 2, uv), array("vertex", 1, vertex)]
+        let middles = certified.map().map().nodes.len() - chart.vertices().len();
+        vertices.map(|v| chart.input_vertex(v).map_or(-2, |w| w as i32)).chain(repeat_n(-1, middles))
+    });
+    vec![Array::doubles("uv", 2, uv), Array::integers("vertex", vertex)]
 }
 
 /// The fields of every triangle.
-fn cell_fields(atlas: &CertifiedAtlas, charts: &[&CertifiedChart], labels: &[Label]) -> Vec<Attribute> {
-    let mut chart: Vec<i32> = Vec::new();
-    let mut triangle: Vec<i32> = Vec::new();
-    let mut untangled: Vec<u8> = Vec::new();
-    let mut colour: Vec<i32> = Vec::new();
-    let mut label: Vec<i32> = Vec::new();
+fn cell_fields(atlas: &CertifiedAtlas, charts: &[&CertifiedChart], labels: &[Label]) -> Vec<Array> {
     let colours = atlas.seams().colours();
-    for certified in charts {
+    // What all triangles of a chart have.
+    let of_chart = |name: &str, value: &dyn Fn(&CertifiedChart) -> i32| {
+        Array::integers(name, charts.iter().flat_map(|c| repeat_n(value(c), c.fields().len())))
+    };
+    let triangle = charts.iter().flat_map(|certified| {
         let cells = 0..certified.fields().len();
-        triangle.extend(cells.map(|f| certified.chart().source_triangle(f) as i32));
-        chart.resize(triangle.len(), certified.id().0 as i32);
-        colour.resize(triangle.len(), colours[certified.id().index()] as i32);
-        label.resize(triangle.len(), tag_of(atlas, certified.id(), labels));
-        untangled.extend(certified.untangled().map(u8::from));
-    }
+        cells.map(|f| certified.chart().source_triangle(f) as i32)
+    });
+    let untangled: Vec<u8> = charts.iter().flat_map(|c| c.untangled().map(u8::from)).collect();
     let fields = || charts.iter().flat_map(|certified| certified.fields());
-    let field = |name: &str, get: fn(&CellFields) -> f64| array(name, 1, fields().map(get).collect::<Vec<f64>>());
+    let field = |name: &str, get: fn(&CellFields) -> f64| Array::field(name, fields().map(get));
     let mut arrays = vec![
-        array("chart", 1, chart),
-        array("triangle", 1, triangle),
+        of_chart("chart", &|c| c.id().0 as i32),
+        Array::integers("triangle", triangle),
         field("det_min", |f| f.det_min),
         field("det_max", |f| f.det_max),
         field("jacobian_ratio", |f| f.jacobian_ratio),
         field("conformal_distortion", |f| f.conformal_distortion),
         field("area_scale", |f| f.area_scale),
-        array("untangled", 1, untangled),
-        array("colour", 1, colour),
+        Array::bytes("untangled", &untangled),
+        of_chart("colour", &|c| colours[c.id().index()] as i32),
     ];
     if !labels.is_empty() {
-        arrays.push(array("label", 1, label));
+        arrays.push(of_chart("label", &|c| tag_of(atlas, c.id(), labels)));
     }
     arrays
 }

@@ -4,34 +4,38 @@
 //! there. Here nodes are those of the surface, and belong to all triangles around them, sheets of a surface that is no
 //! manifold included.
 
-use super::vtu::{VtuError, array, write};
+use super::appended::{Array, Grid};
+use super::vtu::{names_of_labels, tag_of};
 use crate::formats::joined::JoinedVertices;
-use crate::formats::labels::{Label, label_index};
-use planish_core::CertifiedAtlas;
+use crate::formats::labels::Label;
 use planish_core::atlas::Chart;
 use planish_core::mesh::SurfaceMesh;
 use planish_core::vec3::{Vec3, midpoint};
+use planish_core::{CertifiedAtlas, CertifiedChart};
 use std::collections::HashMap;
-use vtkio::model::{Attribute, Attributes};
+use std::iter::repeat_n;
 
 /// The bytes of `welded.vtu`: a triangle of six nodes for each of surface.vtu, in the same order.
 ///
 /// Points: `vertex`, the input vertex, -1 for nodes in the middle of edges, -2 for vertices that were added. Cells:
 /// `chart`,
 /// `triangle`, the input triangle, and where there are labels `label`, the tag of each.
-///
-/// # Errors
-/// [`VtuError::Library`].
-pub fn surface(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Vec<u8>, VtuError> {
+pub fn surface(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<u8> {
     let mut nodes = Nodes::of(atlas.mesh());
     let mut cells = Vec::with_capacity(atlas.mesh().triangles().len());
     for certified in atlas.charts() {
         let faces = 0..certified.chart().triangles().len();
         cells.extend(faces.map(|face| nodes.of_triangle(certified.chart(), face)));
     }
-    let data = Attributes { point: vec![array("vertex", 1, nodes.input)], cell: cell_fields(atlas, labels) };
-    let connectivity = cells.into_iter().flatten().map(u64::from).collect();
-    write("planish welded surface", labels, nodes.points.into_flattened(), connectivity, data)
+    let grid = Grid {
+        count: nodes.points.len(),
+        points: Array::doubles("Points", 3, nodes.points.iter().flatten().copied()),
+        cells: cells.into_flattened(),
+        of_points: vec![Array::integers("vertex", nodes.input.iter().copied())],
+        of_cells: cell_fields(atlas, labels),
+        field_data: names_of_labels(labels),
+    };
+    grid.into_bytes()
 }
 
 /// The nodes of the surface: its vertices, then the middles of its edges as triangles come upon them.
@@ -70,22 +74,18 @@ impl Nodes {
     }
 }
 
-fn cell_fields(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<Attribute> {
-    let mut chart: Vec<i32> = Vec::new();
-    let mut triangle: Vec<i32> = Vec::new();
-    let mut label: Vec<i32> = Vec::new();
-    for certified in atlas.charts() {
+fn cell_fields(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<Array> {
+    let of_chart = |name: &str, value: &dyn Fn(&CertifiedChart) -> i32| {
+        let of_triangles = |c| repeat_n(value(c), c.chart().triangles().len());
+        Array::integers(name, atlas.charts().iter().flat_map(of_triangles))
+    };
+    let triangle = atlas.charts().iter().flat_map(|certified| {
         let faces = 0..certified.chart().triangles().len();
-        triangle.extend(faces.map(|face| certified.chart().source_triangle(face) as i32));
-        chart.resize(triangle.len(), certified.id().0 as i32);
-        if let Some(index) = label_index(atlas, certified.id(), labels) {
-            label.resize(triangle.len(), labels[index].tag);
-        }
-    }
-    let mut fields = vec![array("chart", 1, chart), array("triangle", 1, triangle)];
-    // All charts have one, or none has.
-    if !label.is_empty() {
-        fields.push(array("label", 1, label));
+        faces.map(|face| certified.chart().source_triangle(face) as i32)
+    });
+    let mut fields = vec![of_chart("chart", &|c| c.id().0 as i32), Array::integers("triangle", triangle)];
+    if !labels.is_empty() {
+        fields.push(of_chart("label", &|c| tag_of(atlas, c.id(), labels)));
     }
     fields
 }
@@ -94,31 +94,13 @@ fn cell_fields(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<Attribute> {
 mod tests {
     use super::*;
     use crate::formats::texture::tests::{atlas_of, labelled_cube};
-    use crate::formats::vtu::read_shape;
-    use crate::formats::{Format, read_alone};
+    use crate::formats::vtu::{Shape, read_shape};
+    use crate::formats::{Format, LabelSource, Limits, Source, read_alone};
     use planish_core::shapes;
     use std::collections::BTreeMap;
-    use vtkio::model::{DataSet, Piece, Vtk};
-
-    /// Points, cells, and the labels of the cells.
-    type Grid = (Vec<[f64; 3]>, Vec<[u64; 6]>, Option<Vec<i32>>);
-
-    fn read(bytes: &[u8]) -> Grid {
-        let vtk = Vtk::parse_xml(bytes).expect("a VTU file");
-        let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { panic!("no grid") };
-        let Some(Piece::Inline(piece)) = pieces.into_iter().next() else { panic!("no piece") };
-        let points: Vec<f64> = piece.points.cast_into().expect("doubles");
-        let (connectivity, _) = piece.cells.cell_verts.into_xml();
-        let mut arrays = piece.data.cell.into_iter();
-        let found = arrays.find_map(|a| match a {
-            Attribute::DataArray(array) if array.name == "label" => array.data.cast_into::<i32>(),
-            _ => None,
-        });
-        (points.as_chunks().0.to_vec(), connectivity.as_chunks().0.to_vec(), found)
-    }
 
     /// How many triangles each edge has, with its middle.
-    fn sides(cells: &[[u64; 6]]) -> BTreeMap<([u64; 2], u64), usize> {
+    fn sides(cells: &[[u32; 6]]) -> BTreeMap<([u32; 2], u32), usize> {
         let mut sides = BTreeMap::new();
         for cell in cells {
             for k in 0..3 {
@@ -133,17 +115,17 @@ mod tests {
     fn a_torus_is_closed_and_its_nodes_are_those_of_the_surface() {
         let soup = shapes::ring_torus(24, 12);
         let atlas = atlas_of(&soup);
-        let bytes = surface(&atlas, &[]).expect("written");
-        let (points, cells, label) = read(&bytes);
+        let bytes = surface(&atlas, &[]);
+        let Shape { points, cells, .. } = read_shape(&bytes).expect("read");
         let sides = sides(&cells);
-        assert!(atlas.charts().len() > 1 && label.is_none());
+        assert!(atlas.charts().len() > 1);
         assert!(sides.values().all(|triangles| *triangles == 2), "closed");
         assert_eq!(points.len(), atlas.mesh().points().len() + sides.len());
         for ([a, b], middle) in sides.keys() {
             assert_eq!(points[*middle as usize], midpoint(points[*a as usize], points[*b as usize]));
         }
         // Cell by cell the triangles of surface.vtu, node by node.
-        let open = read_shape(&crate::formats::vtu::surface(&atlas, &[]).expect("written")).expect("read");
+        let open = read_shape(&crate::formats::vtu::surface(&atlas, &[])).expect("read");
         assert_eq!(cells.len(), open.cells.len());
         for (cell, apart) in cells.iter().zip(&open.cells) {
             assert!((0..6).all(|k| points[cell[k] as usize] == open.points[apart[k] as usize]));
@@ -156,19 +138,20 @@ mod tests {
 
     #[test]
     fn sheets_share_the_edges_where_they_meet() {
-        let (_, cells, _) = read(&surface(&atlas_of(&shapes::book(3, 4)), &[]).expect("written"));
+        let cells = read_shape(&surface(&atlas_of(&shapes::book(3, 4)), &[])).expect("read").cells;
         assert_eq!(sides(&cells).values().filter(|triangles| **triangles == 3).count(), 4, "three pages at the spine");
     }
 
     #[test]
     fn parts_with_labels_share_nodes_and_tell_their_tags() {
         let (atlas, labels) = labelled_cube();
-        let (_, cells, label) = read(&surface(&atlas, &labels).expect("written"));
+        let bytes = surface(&atlas, &labels);
+        let cells = read_shape(&bytes).expect("read").cells;
         assert!(sides(&cells).values().all(|triangles| *triangles == 2));
-        let mut tags = label.expect("a field");
-        assert_eq!(tags.len(), cells.len());
-        tags.sort_unstable();
-        tags.dedup();
+        let limits = Limits::default();
+        let source = Source { labels: &LabelSource::Array("label".to_owned()), ..Source::alone(&bytes, &limits) };
+        let labels = crate::formats::read(Format::Vtu, &source).expect("read").notes.labels;
+        let tags: Vec<i32> = labels.iter().map(|l| l.tag).collect();
         assert_eq!(tags, [10, 11, 12, 13, 14, 15]);
     }
 }
