@@ -14,6 +14,8 @@ use std::f64::consts::PI;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub area_ratio: f64,
+    /// What their maps must not exceed.
+    pub largest_ratio: f64,
     pub triangles: usize,
     pub strict_disks: bool,
     /// Which maps are predicted.

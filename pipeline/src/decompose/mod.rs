@@ -169,6 +169,7 @@ impl Limits {
     fn new(settings: &Settings) -> Self {
         Self {
             area_ratio: settings.max_area_ratio.powf(MARGIN),
+            largest_ratio: settings.max_area_ratio,
             triangles: settings.max_triangles,
             strict_disks: settings.strict_disks,
             boundary: settings.boundary,

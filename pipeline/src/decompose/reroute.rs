@@ -232,8 +232,13 @@ mod tests {
             let dual = Dual::new(&mesh, &NoMonitor);
             let cells = compact_cells(&dual, |_| charts, &dual.checkpoint).expect("nobody cancels");
             let largest = 11 * mesh.triangles().len() / charts / 10;
-            let limits =
-                Limits { area_ratio: 1e6, triangles: largest, strict_disks: false, boundary: BoundaryShape::Natural };
+            let limits = Limits {
+                area_ratio: 1e6,
+                largest_ratio: 1e6,
+                triangles: largest,
+                strict_disks: false,
+                boundary: BoundaryShape::Natural,
+            };
             let mut network = Network::new(&dual, cells.labels, limits);
             let mut random = Random(7);
             let (mut laid, mut undone) = (0, 0);

@@ -14,12 +14,14 @@ use super::voronoi::{Cells, bisect_until, farthest_first};
 use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
 use crate::monitor::{Interrupted, Monitor};
-use crate::topology::partition::Partition;
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
 /// Where to cut, as shares of the range of the logarithm of the area scale: the middle first, as it halves the decades of
 /// distortion on both sides.
 const LEVELS: [f64; 9] = [0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7];
+
+/// How many protrusions are cut off at once, at most.
+const MOST_CUTS: u32 = 32;
 
 /// How much longer a cut in the middle may be than one away from it, per share of the range. By experience: larger cuts
 /// nearer to the middle, smaller where the way across is shorter.
@@ -55,7 +57,7 @@ pub fn split(
     }
     let cut = |dual: &Dual, limits: &Limits| {
         let by_scale = match log_scale {
-            Some(log_scale) => across_protrusion(dual, log_scale, limits)?,
+            Some(log_scale) => across_protrusions(dual, log_scale, limits)?,
             None => None,
         };
         by_scale.map_or_else(|| halves(dual, limits), Ok)
@@ -232,53 +234,121 @@ pub(super) fn legal(dual: &Dual, complex: &Complex, limits: &Limits) -> Result<V
     Ok(legal)
 }
 
-/// The best legal cut along a level of the area scale.
-fn across_protrusion(dual: &Dual, log_scale: &[f64], limits: &Limits) -> Result<Option<Vec<u32>>, Interrupted> {
-    let mut sorted = log_scale.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    // Without the least and the largest 0.1 %, which single bad triangles decide.
-    let few = sorted.len() / 1000;
-    let (low, high) = (sorted[few], sorted[sorted.len() - 1 - few]);
-    let mut best: Option<(f64, Vec<u32>)> = None;
-    for level in LEVELS {
-        let Some(labels) = below(dual, log_scale, low + level * (high - low)) else { continue };
-        let groups = Cells { labels, len: 2 };
-        let cost = cut_length(dual, &groups.labels) * (1.0 + OFF_CENTRE * (level - 0.5).abs());
-        let legal = legal(dual, &Complex::new(dual, &groups), limits)?;
-        let is_legal = legal.iter().all(|l| *l);
-        // Of cuts that cost the same, the first one.
-        if is_legal && best.as_ref().is_none_or(|b| cost.total_cmp(&b.0).is_lt()) {
-            best = Some((cost, groups.labels));
+/// Labels that cut off the region around the least area scale along the best level; where the scales of the rest still differ by more
+/// than charts may, those of the next regions, too: a chart with many fingers (lucy_100k, eight at a ratio of 4e15) is mapped and
+/// cut once, and not once for each of them. None where there is no legal cut.
+///
+/// Labels are 0 for the rest, which has the largest scale, then 1, 2, ... It ends after [`MOST_CUTS`].
+fn across_protrusions(dual: &Dual, log_scale: &[f64], limits: &Limits) -> Result<Option<Vec<u32>>, Interrupted> {
+    let mut labels = vec![0; log_scale.len()];
+    for next in 1..=MOST_CUTS {
+        let rest: Vec<usize> = (0..labels.len()).filter(|f| labels[*f] == 0).collect();
+        let Some(range) = Range::of(rest.iter().map(|f| log_scale[*f])) else { break };
+        if next > 1 && range.width() <= limits.largest_ratio.ln() {
+            break;
+        }
+        let Some(cut) = best_cut(dual, log_scale, &labels, &rest, range, limits)? else { break };
+        for f in cut {
+            labels[f] = next;
         }
     }
-    Ok(best.map(|(_, labels)| labels))
+    Ok(labels.iter().any(|label| *label > 0).then_some(labels))
 }
 
-fn cut_length(dual: &Dual, labels: &[u32]) -> f64 {
-    let parts = Partition::new(dual, labels);
-    dual.half_edges().filter(|h| parts.is_seam(*h)).map(|h| dual.length(h)).sum()
+/// Where area scales lie, but for the least and the largest 0.1 %, which single bad triangles decide.
+#[derive(Clone, Copy)]
+struct Range {
+    low: f64,
+    high: f64,
 }
 
-/// Label 1 for the connected region below `level` that holds the least scale, filled up so that the rest (label 0),
-/// which holds the largest, is connected, too; none where nothing is left.
-fn below(dual: &Dual, log_scale: &[f64], level: f64) -> Option<Vec<u32>> {
-    let n = log_scale.len();
-    let least = (0..n).min_by(|a, b| log_scale[*a].total_cmp(&log_scale[*b]))?;
-    let largest = (0..n).max_by(|a, b| log_scale[*a].total_cmp(&log_scale[*b]).then(b.cmp(a)))?;
-    let low: Vec<bool> = log_scale.iter().map(|s| *s < level).collect();
-    let tip = connected(dual, least, |f| low[f]);
+impl Range {
+    /// That of some logarithms; none where there are none.
+    fn of(log_scale: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut sorted: Vec<f64> = log_scale.collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let few = sorted.len() / 1000;
+        Some(Self { low: *sorted.get(few)?, high: sorted[sorted.len() - 1 - few] })
+    }
+
+    fn width(self) -> f64 {
+        self.high - self.low
+    }
+
+    fn at(self, share: f64) -> f64 {
+        self.low + share * self.width()
+    }
+}
+
+/// The triangles that the best legal cut along a level takes off the `rest`, which is what has label 0.
+fn best_cut(
+    dual: &Dual,
+    log_scale: &[f64],
+    labels: &[u32],
+    rest: &[usize],
+    range: Range,
+    limits: &Limits,
+) -> Result<Option<Vec<usize>>, Interrupted> {
+    let mut cuts = Vec::new();
+    for level in LEVELS {
+        let Some(cut) = below(dual, log_scale, labels, rest, range.at(level)) else { continue };
+        let cost = cut_length(dual, labels, &cut) * (1.0 + OFF_CENTRE * (level - 0.5).abs());
+        cuts.push((cost, cut));
+    }
+    // Of cuts that cost the same, the first one.
+    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (_, is_cut) in cuts {
+        let groups = labels.iter().zip(&is_cut).map(|(label, is_cut)| match label {
+            0 => u32::from(*is_cut),
+            _ => label + 1,
+        });
+        let groups = Cells { labels: groups.collect(), len: 2 + labels.iter().max().map_or(0, |most| *most as usize) };
+        let legal = legal(dual, &Complex::new(dual, &groups), limits)?;
+        if legal.iter().all(|l| *l) {
+            return Ok(Some(rest.iter().copied().filter(|f| is_cut[*f]).collect()));
+        }
+    }
+    Ok(None)
+}
+
+/// The length between what is cut off and the rest.
+fn cut_length(dual: &Dual, labels: &[u32], is_cut: &[bool]) -> f64 {
+    let faces = (0..labels.len()).filter(|f| is_cut[*f]).map(FaceId::at);
+    let sides = faces.flat_map(|face| (0..3).map(move |k| HalfEdgeId::side_of(face, k)));
+    let is_between = |h: &HalfEdgeId| {
+        dual.twin(*h).is_some_and(|twin| !is_cut[twin.face().index()] && labels[twin.face().index()] == 0)
+    };
+    sides.filter(is_between).map(|h| dual.length(h)).sum()
+}
+
+/// Of the `rest`, which is what has label 0, the connected region below `level` that holds the least scale, filled up so that what
+/// stays, which holds the largest, is connected, too; none where nothing is left.
+fn below(dual: &Dual, log_scale: &[f64], labels: &[u32], rest: &[usize], level: f64) -> Option<Vec<bool>> {
+    let least = rest.iter().copied().min_by(|a, b| log_scale[*a].total_cmp(&log_scale[*b]))?;
+    let largest = rest.iter().copied().max_by(|a, b| log_scale[*a].total_cmp(&log_scale[*b]).then(b.cmp(a)))?;
+    let tip = connected(dual, least, |f| labels[f] == 0 && log_scale[f] < level);
     // What the tip cuts off from the largest scale belongs to it, too: both sides are connected.
-    let rest = connected(dual, largest, |f| !tip[f]);
+    let stays = connected(dual, largest, |f| labels[f] == 0 && !tip[f]);
     if !tip[least] || tip[largest] {
         return None;
     }
-    Some(rest.into_iter().map(|is_rest| u32::from(!is_rest)).collect())
+    Some((0..labels.len()).map(|f| labels[f] == 0 && !stays[f]).collect())
 }
 
-/// The triangles among those that `admit` tells which are connected to `seed`.
+/// The triangles that are connected to `seed` through those that `admit` tells.
 fn connected(dual: &Dual, seed: usize, admit: impl Fn(usize) -> bool) -> Vec<bool> {
-    let admits = |h: HalfEdgeId| admit(h.face().index());
-    let mut sets = dual.united(|h, twin| admits(h) && admits(twin));
-    let root = sets.find(seed);
-    (0..dual.mesh.triangles().len()).map(|f| admit(f) && sets.find(f) == root).collect()
+    let mut is_connected = vec![false; dual.mesh.triangles().len()];
+    is_connected[seed] = admit(seed);
+    let mut front: Vec<FaceId> = if is_connected[seed] { vec![FaceId::at(seed)] } else { vec![] };
+    // Each triangle enters once.
+    while let Some(face) = front.pop() {
+        for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
+            let Some(other) = dual.twin(h).map(HalfEdgeId::face) else { continue };
+            if !is_connected[other.index()] && admit(other.index()) {
+                is_connected[other.index()] = true;
+                front.push(other);
+            }
+        }
+    }
+    is_connected
 }
