@@ -106,12 +106,8 @@ impl SizeField {
 
     /// The size at a point; infinite where nothing is asked for anywhere. All places are looked at.
     pub fn at(&self, x: Vec3) -> f64 {
-        self.least(self.places.iter(), x)
-    }
-
-    /// The least that some places ask for at a point.
-    fn least<'a>(&self, places: impl Iterator<Item = &'a SizedPlace>, x: Vec3) -> f64 {
-        places.map(|place| place.asks(distance(place.at, x), self.gradation)).fold(f64::INFINITY, f64::min)
+        let asked = self.places.iter().map(|place| place.asks(distance(place.at, x), self.gradation));
+        asked.fold(f64::INFINITY, f64::min)
     }
 
     /// The field on cubes that cover the triangles of a surface where it is below `most`, where sizes are cut off; none where that
@@ -146,26 +142,51 @@ impl SizeField {
         for corner in 0..8 {
             cube.sizes[corner] = self.at(cube.corner(corner)).min(most);
         }
-        let all = |count: usize| (0..count as u32).collect::<Vec<u32>>();
-        let (places, least) = self.near(&cube, &all(self.places.len()), most);
-        (!places.is_empty()).then(|| Cell { cube, places, least, faces: all(surface.len()), halvings: 0 })
+        let all: Vec<Near> = (0..self.places.len() as u32).map(|place| Near { place, at_least: 0.0 }).collect();
+        let places = self.near(&cube, &all, most);
+        let faces = (0..surface.len() as u32).collect();
+        (!places.is_empty()).then_some(Cell { cube, places, faces, halvings: 0 })
     }
 
-    /// Those places that ask for the least at some point of a cube, or may do so; and below what none of them asks in it.
-    fn near(&self, cube: &SizedCube, places: &[u32], most: f64) -> (Vec<u32>, f64) {
-        let mut least = most;
-        let mut near = Vec::with_capacity(places.len());
-        for i in places {
-            let place = &self.places[*i as usize];
-            let (nearest, farthest) = cube.distances(place.at);
-            let at_least = place.asks(nearest, self.gradation);
-            if at_least <= least && at_least < most {
-                near.push((*i, at_least));
-                least = least.min(place.asks(farthest, self.gradation));
+    /// Those places that ask for the least at some point of a cube, or may do so, the least of what they may ask first. Of places that
+    /// ask for the same one is enough: along a curve a thousand ask for one size within one cube (menger_sponge3). `places` are
+    /// those of a cube around it.
+    fn near(&self, cube: &SizedCube, places: &[Near], most: f64) -> Vec<Near> {
+        // One of them asks for no more than this anywhere in the cube.
+        let (mut least, mut one) = (most, None);
+        let mut near = Vec::new();
+        for Near { place, at_least } in places {
+            // Neither does this one, nor those behind it.
+            if *at_least >= least {
+                break;
+            }
+            let found = &self.places[*place as usize];
+            let (nearest, farthest) = cube.distances(found.at);
+            let at_least = found.asks(nearest, self.gradation);
+            if at_least < least {
+                near.push(Near { place: *place, at_least });
+                let at_most = found.asks(farthest, self.gradation);
+                if at_most < least {
+                    (least, one) = (at_most, Some(*place));
+                }
             }
         }
-        let below = near.iter().map(|(_, at_least)| *at_least).fold(most, f64::min);
-        (near.iter().filter(|(_, at_least)| *at_least <= least).map(|(i, _)| *i).collect(), below)
+        near.retain(|found| found.at_least < least || Some(found.place) == one);
+        near.sort_by(|a, b| a.at_least.total_cmp(&b.at_least));
+        near
+    }
+
+    /// The least that places near a point ask for there.
+    fn least(&self, near: &[Near], x: Vec3) -> f64 {
+        let mut least = f64::INFINITY;
+        for Near { place, at_least } in near {
+            if *at_least >= least {
+                break;
+            }
+            let place = &self.places[*place as usize];
+            least = least.min(place.asks(distance(place.at, x), self.gradation));
+        }
+        least
     }
 
     /// The field at the corners of a cube and in between: at 3 times 3 times 3 points, along x first.
@@ -177,7 +198,7 @@ impl SizeField {
                 cell.cube.sizes[corner_number(steps.map(|step| step / 2))]
             } else {
                 let x = [0, 1, 2].map(|k| cell.cube.low[k] + 0.5 * steps[k] as f64 * cell.cube.side);
-                self.least(cell.places.iter().map(|i| &self.places[*i as usize]), x).min(most)
+                self.least(&cell.places, x).min(most)
             };
         }
         lattice
@@ -185,13 +206,13 @@ impl SizeField {
 
     /// The field on the lattice of a cube; none where the sizes at its corners tell the field in it.
     fn needed_lattice(&self, cell: &Cell, most: f64) -> Option<[f64; LATTICE]> {
-        if cell.cube.side <= cell.least || cell.halvings == MAX_HALVINGS {
+        if cell.cube.side <= cell.least() || cell.halvings == MAX_HALVINGS {
             return None;
         }
         let lattice = self.on_lattice(cell, most);
         let found = lattice.iter().copied().fold(most, f64::min);
         let is_close = |(number, found): (usize, &f64)| (cell.told(number) - found).abs() <= CLOSE * found;
-        let is_told = cell.least >= HIDDEN * found && lattice.iter().enumerate().all(is_close);
+        let is_told = cell.least() >= HIDDEN * found && lattice.iter().enumerate().all(is_close);
         (!is_told).then_some(lattice)
     }
 
@@ -212,12 +233,12 @@ impl SizeField {
             let [i, j, k] = [0, 1, 2].map(|k| from[k] + (corner >> k & 1));
             cube.sizes[corner] = lattice[i + 3 * j + 9 * k];
         }
-        let (places, least) = self.near(&cube, &cell.places, most);
-        if places.is_empty() {
+        let faces: Vec<u32> = cell.faces.iter().copied().filter(|f| meets(&cube, &surface[*f as usize])).collect();
+        if faces.is_empty() {
             return None;
         }
-        let faces: Vec<u32> = cell.faces.iter().copied().filter(|f| meets(&cube, &surface[*f as usize])).collect();
-        (!faces.is_empty()).then_some(Cell { cube, places, least, faces, halvings: cell.halvings + 1 })
+        let places = self.near(&cube, &cell.places, most);
+        (!places.is_empty()).then_some(Cell { cube, places, faces, halvings: cell.halvings + 1 })
     }
 }
 
@@ -234,13 +255,19 @@ fn corner_number([i, j, k]: [usize; 3]) -> usize {
     i + 2 * j + 4 * k
 }
 
+/// A place near a cube.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    place: u32,
+    /// It asks for no less in the cube.
+    at_least: f64,
+}
+
 /// A cube that is looked at.
 struct Cell {
     cube: SizedCube,
-    /// The places that tell the field in it.
-    places: Vec<u32>,
-    /// None of them asks for less in it.
-    least: f64,
+    /// The places that tell the field in it, the least of what they may ask first; at least one.
+    places: Vec<Near>,
     /// The triangles that pass through it.
     faces: Vec<u32>,
     /// How often it was halved.
@@ -248,6 +275,11 @@ struct Cell {
 }
 
 impl Cell {
+    /// No place asks for less in the cube.
+    fn least(&self) -> f64 {
+        self.places[0].at_least
+    }
+
     /// What trilinear interpolation tells at a point of the lattice: the mean of the corners around it.
     fn told(&self, number: usize) -> f64 {
         let steps = steps(number);
