@@ -2,7 +2,7 @@
 //! again, as long as unions are legal and not too distorted.
 
 use super::BoundaryShape;
-use super::predict::{CellGraph, WORK_PER_CELL, predict};
+use super::predict::{CellGraph, Predictions, WORK_PER_CELL};
 use super::regions::{Regions, Shape, Union};
 use crate::monitor::{Checkpoint, Interrupted};
 use crate::vec3::norm;
@@ -70,6 +70,7 @@ impl Ord for Candidate {
 pub(super) struct Merge<'a, 'b> {
     pub regions: &'b mut Regions<'a>,
     pub graph: &'b CellGraph,
+    pub predictions: &'b mut Predictions,
     pub limits: Limits,
     pub weights: Weights,
     /// Per region its area ratio, as far as it is known, else 1.
@@ -137,7 +138,7 @@ impl Merge<'_, '_> {
         let cells_of = |r: u32| self.regions.all[r as usize].cells.iter().copied();
         let cells: Vec<u32> = cells_of(a).chain(cells_of(b)).collect();
         let loops = &union.outline.loops;
-        let ratio = predict(self.regions.complex, self.graph, &cells, loops).area_ratio;
+        let ratio = self.predictions.area_ratio(self.regions.complex, self.graph, &cells, loops);
         let evaluated = Candidate { cost: self.cost((a, b), &union, ratio), ratio: Some(ratio), ..candidate };
         (ratio <= self.limits.area_ratio).then_some(evaluated)
     }

@@ -58,7 +58,7 @@ use finish::finish;
 pub use legality::Illegal;
 use merge::Limits;
 use patches::compact_cells;
-use predict::CellGraph;
+use predict::{CellGraph, Predictions};
 use search::Search;
 use selection::Selection;
 use split::legal;
@@ -148,9 +148,10 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, monitor: &dyn Monitor)
     let limits = Limits::new(settings);
     let (cells, complex) = cells(&dual, &limits)?;
     let graph = CellGraph::new(&complex, settings.boundary);
-    let search = Search {
+    let mut search = Search {
         complex: &complex,
         graph: &graph,
+        predictions: Predictions::default(),
         limits,
         bound: settings.max_area_ratio,
         checkpoint: &dual.checkpoint,

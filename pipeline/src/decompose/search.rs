@@ -6,7 +6,7 @@
 
 use super::complex::{Complex, NONE};
 use super::merge::{Limits, Merge, Weights};
-use super::predict::{CellGraph, WORK_PER_CELL, predict};
+use super::predict::{CellGraph, Predictions, WORK_PER_CELL};
 use super::principal_axes::{Axes, faces_along, principal_axes};
 use super::regions::{Region, Regions};
 use super::voronoi::{Cells, bisect_until, farthest_first};
@@ -56,6 +56,7 @@ const SEAMS: f64 = 0.65;
 pub(super) struct Search<'a> {
     pub complex: &'a Complex,
     pub graph: &'a CellGraph,
+    pub predictions: Predictions,
     pub limits: Limits,
     /// The largest area ratio of a chart.
     pub bound: f64,
@@ -124,7 +125,7 @@ impl Sums {
 
 impl Search<'_> {
     /// Grows charts by every strategy, for the components that cannot be left whole.
-    pub(super) fn run(&self) -> Result<SearchResult, Interrupted> {
+    pub(super) fn run(&mut self) -> Result<SearchResult, Interrupted> {
         let components = farthest_first(self.graph, |_| 1);
         let whole = Regions::new(self.complex, components.labels.clone(), components.len);
         let whole = self.fine(whole, WHOLE * self.bound)?;
@@ -154,14 +155,15 @@ impl Search<'_> {
     }
 
     /// Per region, whether it may be a chart with at most this area ratio.
-    fn fine(&self, mut regions: Regions, largest: f64) -> Result<Vec<bool>, Interrupted> {
+    fn fine(&mut self, mut regions: Regions, largest: f64) -> Result<Vec<bool>, Interrupted> {
         let mut fine = Vec::with_capacity(regions.all.len());
         for label in 0..regions.all.len() {
             let outline = regions.outline_of(label as u32);
             let region = &regions.all[label];
             self.checkpoint.after(WORK_PER_CELL * region.cells.len())?;
             let is_allowed = self.limits.allow(&regions.shape(region, &outline));
-            let ratio = || predict(self.complex, self.graph, &region.cells, &outline.loops).area_ratio;
+            let predictions = &mut self.predictions;
+            let mut ratio = || predictions.area_ratio(self.complex, self.graph, &region.cells, &outline.loops);
             fine.push(is_allowed && ratio() <= largest);
         }
         Ok(fine)
@@ -169,7 +171,7 @@ impl Search<'_> {
 
     /// Grows charts by one strategy: per cell its chart, and the score of every component.
     fn grow(
-        &self,
+        &mut self,
         strategy: &Strategy,
         components: &Cells,
         axes: &[Axes],
@@ -199,7 +201,7 @@ impl Search<'_> {
 
     /// Unites charts across features wherever these are not sharp and long enough to part them, whatever their
     /// component.
-    pub(super) fn absorb(&self, charts: Cells, min_outline: f64) -> Result<Cells, Interrupted> {
+    pub(super) fn absorb(&mut self, charts: Cells, min_outline: f64) -> Result<Cells, Interrupted> {
         let count = charts.len;
         let mut regions = Regions::new(self.complex, charts.labels, count);
         self.merge(&mut regions, &mut vec![1.0; count], vec![0; count], BALANCED, min_outline)?;
@@ -207,7 +209,7 @@ impl Search<'_> {
     }
 
     fn merge(
-        &self,
+        &mut self,
         regions: &mut Regions,
         ratios: &mut [f64],
         groups: Vec<u32>,
@@ -215,7 +217,8 @@ impl Search<'_> {
         min_outline: f64,
     ) -> Result<(), Interrupted> {
         let (graph, limits, checkpoint) = (self.graph, self.limits, self.checkpoint);
-        Merge { regions, graph, limits, weights, ratios, groups, min_outline, checkpoint }.run()
+        let predictions = &mut self.predictions;
+        Merge { regions, graph, predictions, limits, weights, ratios, groups, min_outline, checkpoint }.run()
     }
 
     /// The score of every component.

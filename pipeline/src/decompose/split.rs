@@ -13,6 +13,7 @@ use super::regions::Regions;
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
+use crate::mesh::SurfaceMesh;
 use crate::monitor::{Interrupted, Monitor};
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
@@ -135,10 +136,11 @@ pub fn contact(chart: &Chart) -> Option<[VertexId; 2]> {
     Some([VertexId(twice[0].1), VertexId(twice[1].1)])
 }
 
-/// The chart of some triangles of `chart`, ascending, with the same id; none where they form none.
-pub(crate) fn part_of(chart: &Chart, faces: &[FaceId]) -> Option<Chart> {
-    let surface = chart.to_surface().restricted(faces);
-    let piece = assemble(&surface, &vec![0; faces.len()]).ok()?.into_charts().pop()?;
+/// The chart of some triangles of `chart`, ascending, with the same id; none where they form none. `surface` is the chart as a
+/// surface.
+pub(crate) fn part_of(chart: &Chart, surface: &SurfaceMesh, faces: &[FaceId]) -> Option<Chart> {
+    let part = surface.restricted(faces);
+    let piece = assemble(&part, &vec![0; faces.len()]).ok()?.into_charts().pop()?;
     let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| chart.triangles[f.index()]).collect();
     vertices.sort_unstable();
     vertices.dedup();

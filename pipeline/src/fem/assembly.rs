@@ -65,6 +65,17 @@ impl<'a, const C: usize> Assembly<'a, C> {
         }
     }
 
+    /// The entries of the matrix, in the places of the pattern, and the right-hand sides, one column for each field.
+    pub(crate) fn system(&self) -> (&[f64], &[f64]) {
+        (&self.matrix, &self.rhs)
+    }
+
+    /// The values of the fields at all nodes, with the `solution` of the system at those that are free.
+    pub(crate) fn with_solution(mut self, solution: &[f64]) -> Vec<[f64; C]> {
+        self.dofs.scatter(solution, &mut self.values);
+        self.values
+    }
+
     /// The values of the fields at all nodes. `analysis` is that of the pattern.
     ///
     /// # Errors

@@ -20,3 +20,4 @@ pub(crate) mod laplace;
 pub mod quadrature;
 pub mod sparse;
 pub mod stiffness;
+pub(crate) mod two_level;

@@ -141,6 +141,12 @@ impl Pattern {
         }
     }
 
+    /// The rows of the entries of a column of the lower triangle, that of the diagonal first, and their places.
+    pub(crate) fn column(&self, j: usize) -> (&[u32], std::ops::Range<usize>) {
+        let places = self.starts[j] as usize..self.starts[j + 1] as usize;
+        (&self.rows[places.clone()], places)
+    }
+
     /// The places of the diagonal entries among the values of a matrix: the first of each column.
     pub fn diagonal(&self) -> impl Iterator<Item = usize> {
         self.starts[..self.unknowns].iter().map(|s| *s as usize)

@@ -3,10 +3,13 @@
 use super::elimination;
 use super::filled::FilledChart;
 use super::nodes::Nodes;
-use crate::fem::element::{self, Element};
+use crate::fem::assembly::Assembly;
+use crate::fem::dofs::Dofs;
+use crate::fem::element::{self, Element, P2};
 use crate::fem::laplace;
 use crate::fem::sparse;
 use crate::fem::stiffness::Triangles;
+use crate::fem::two_level::{Prolongation, TwoLevel};
 use crate::monitor::{Checkpoint, Monitor};
 
 /// The values (u, v) at all nodes of element `E` (see [`Nodes`]) of the harmonic map of a filled chart. `on_outer` tells
@@ -53,13 +56,71 @@ pub fn harmonic_map<E: Element<N>, const N: usize>(
 ) -> Result<Vec<[f64; 2]>, sparse::Error> {
     let nodes = Nodes::<E, N>::on(chart);
     let dofs = elimination::dofs_inside(&nodes, chart);
+    let prescribed = prescribed(&nodes, chart, on_outer);
+    let stiffness = |face: usize| chart.stiffness::<E, N>(face);
+    let faces = chart.triangles().len();
+    laplace::harmonic(&dofs, faces, |f| nodes.of(f), stiffness, prescribed, &Checkpoint::new(monitor))
+}
+
+/// Per node its place on the outer loop; nothing for those inside.
+fn prescribed<E: Element<N>, const N: usize>(
+    nodes: &Nodes<E, N>,
+    chart: &FilledChart,
+    on_outer: impl Fn(usize, f64) -> [f64; 2],
+) -> Vec<[f64; 2]> {
     let mut prescribed = vec![[0.0; 2]; nodes.count()];
     for i in 0..chart.outer().len() {
         nodes.on_outer(i).for_each(|(node, share)| prescribed[node] = on_outer(i, share));
     }
-    let stiffness = |face: usize| chart.stiffness::<E, N>(face);
-    let faces = chart.triangles().len();
-    laplace::harmonic(&dofs, faces, |f| nodes.of(f), stiffness, prescribed, &Checkpoint::new(monitor))
+    prescribed
+}
+
+/// As [`harmonic_map`] of quadratic elements, by conjugate gradients ([`TwoLevel`]): with a third of the memory. None where a
+/// factor is sooner there, unless they are the `last_resort`, and where they do not come to rest.
+///
+/// # Errors
+/// As [`harmonic_map`].
+pub(crate) fn iterated_harmonic_map(
+    chart: &FilledChart,
+    on_outer: impl Fn(usize, f64) -> [f64; 2],
+    last_resort: bool,
+    monitor: &dyn Monitor,
+) -> Result<Option<Vec<[f64; 2]>>, sparse::Error> {
+    let checkpoint = Checkpoint::new(monitor);
+    let nodes = chart.quadratic_nodes();
+    let is_outer = nodes.is_outer();
+    // As they are numbered: what is near in the mesh is near in memory.
+    let fine = Dofs::new(nodes.count(), (0..nodes.count() as u32).filter(|n| !is_outer[*n as usize]).collect());
+    // In the order in which they are eliminated.
+    let vertices = chart.elimination().iter().map(|v| nodes.at_vertex(*v) as u32);
+    let coarse = Dofs::new(nodes.count(), vertices.filter(|n| !is_outer[*n as usize]).collect());
+    let faces = 0..chart.triangles().len();
+    let corners = |f: usize| {
+        let [a, b, c, ..] = nodes.of(f);
+        [a, b, c]
+    };
+    checkpoint.after(faces.len())?;
+    let pattern = fine.pattern(faces.clone().map(|f| nodes.of(f)));
+    let coarse_pattern = coarse.pattern(faces.clone().map(corners));
+    let mut system = Assembly::new(&fine, &pattern, prescribed(&nodes, chart, on_outer));
+    let mut linear = coarse_pattern.zeros();
+    for f in faces.clone() {
+        let matrix = chart.stiffness::<P2, 6>(f);
+        system.add(f, &nodes.of(f), &matrix);
+        coarse_pattern.add(&mut linear, f, &Prolongation::galerkin(&matrix));
+    }
+    checkpoint.after(faces.len())?;
+    let analysis = coarse_pattern.analyse_as_numbered()?;
+    let factor = match analysis.factorise(&linear, monitor) {
+        Ok(factor) => factor,
+        Err(sparse::Error::Unsolvable(_)) => return Ok(None),
+        Err(interrupted) => return Err(interrupted),
+    };
+    let prolongation = Prolongation::new(&fine, &coarse, faces.map(|f| nodes.of(f)));
+    let (matrix, rhs) = system.system();
+    let levels = TwoLevel { pattern: &pattern, matrix, coarse: &factor, prolongation: &prolongation, last_resort };
+    let solution = levels.solve(rhs, &checkpoint)?;
+    Ok(solution.map(|solution| system.with_solution(&solution)))
 }
 
 /// The Dirichlet energy of the map with these values at the nodes of element `E`, that on the fans included.
@@ -73,8 +134,8 @@ pub fn dirichlet_energy<E: Element<N>, const N: usize>(chart: &FilledChart, uv: 
 mod tests {
     use super::*;
     use crate::atlas::Chart;
+    use crate::fem::element::P1;
     use crate::fem::element::cubic::Cubic;
-    use crate::fem::element::{P1, P2};
     use crate::fem::quadrature::Rule;
     use crate::monitor::NoMonitor;
     use crate::topology::VertexId;
@@ -178,5 +239,31 @@ mod tests {
         let [of_flat, of_curved] = [flat / fine_flat, curved / fine_curved].map(f64::log2);
         assert!(of_flat < 2.2 && of_curved > 2.7, "{of_flat} {of_curved}");
         assert!(fine_curved < 0.1 * fine_flat, "{fine_curved} {fine_flat}");
+    }
+
+    /// The solution of either solver, on good and on bad triangles, with holes, whatever the size.
+    #[test]
+    fn conjugate_gradients_come_to_the_solution_of_the_factorised_system() {
+        let soups = [
+            shapes::disk(3),
+            shapes::disk(40),
+            shapes::bent_disk(24, 0.45, 1.0),
+            shapes::disk_with_holes(21, 3),
+            shapes::sliver_strip(6),
+        ];
+        for soup in soups {
+            let mesh = repair(&soup, &Default::default()).expect("a surface").mesh;
+            let atlas = decompose::assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("one chart");
+            let filled = FilledChart::new(&atlas.charts()[0]);
+            let count = filled.outer().len() as f64;
+            let on_outer = |edge: usize, share: f64| {
+                let turn = std::f64::consts::TAU * (edge as f64 + share) / count;
+                [turn.cos(), turn.sin()]
+            };
+            let exact = harmonic_map::<P2, 6>(&filled, on_outer, &NoMonitor).expect("solves");
+            let found = iterated_harmonic_map(&filled, on_outer, true, &NoMonitor).expect("solves").expect("comes to rest");
+            let off = exact.iter().zip(&found).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
+            assert!(off < 1e-9, "{off:.1e} of {} triangles", soup.triangles().len());
+        }
     }
 }

@@ -203,12 +203,12 @@ impl SurfaceMesh {
     /// The surface of some faces, ascending, which hold all triangles around each of their edges. Where its sheets met is
     /// still to be counted ([`Self::of_sheets`]).
     pub(crate) fn restricted(&self, faces: &[FaceId]) -> Self {
-        let mut is_used = vec![false; self.points.len()];
-        faces.iter().flat_map(|f| self.triangles[f.index()]).for_each(|v| is_used[v.index()] = true);
-        let vertices: Vec<VertexId> = (0..is_used.len()).filter(|v| is_used[*v]).map(VertexId::at).collect();
-        let mut number = vec![VertexId(u32::MAX); self.points.len()];
-        vertices.iter().zip(0..).for_each(|(v, n)| number[v.index()] = VertexId(n));
-        let triangles = faces.iter().map(|f| self.triangles[f.index()].map(|v| number[v.index()])).collect();
+        // What it costs depends on the part alone.
+        let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| self.triangles[f.index()]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let number = |v: VertexId| VertexId::at(vertices.partition_point(|w| *w < v));
+        let triangles = faces.iter().map(|f| self.triangles[f.index()].map(number)).collect();
         let local = |f: FaceId| faces.binary_search(&f).ok().map(FaceId::at);
         let metric = Metric {
             shapes: faces.iter().map(|f| self.metric.shapes[f.index()]).collect(),

@@ -8,7 +8,8 @@
 //! Cutting is no end in itself: more charts mean more curves on which the nodes of a mesh are bound to lie. A cut is
 //! tried, and taken only where all parts suit a mesher and are few.
 
-use super::job::{ChartError, MapError, Maps, map_whole, natural_maps};
+use super::job::{ChartError, MapError, Maps, map_whole};
+use super::join::joined;
 use crate::atlas::Chart;
 use crate::certified::BoundaryFound;
 use crate::decompose;
@@ -16,8 +17,6 @@ use crate::map::natural::{self, NoNatural};
 use crate::measure::distortion;
 use crate::monitor::{Interrupted, Monitor};
 use crate::settings::{BoundaryShape, ChartSettings};
-use crate::topology::{FaceId, Stars, VertexId};
-use std::collections::BTreeMap;
 
 /// Charts whose maps stretch more than this on a hundredth of their area are cut, unless they have a natural map. Hills
 /// of a terrain, at 10 to 50, and soccerball_g31, at 80, are well left whole.
@@ -30,7 +29,7 @@ const UNEVEN: f64 = 30.0;
 /// Charts with holes on the disk are cut, too, if so much of their harmonic map is invalid: untangling takes long, and stretches
 /// them (the inside of imu_adis16480, with 16 holes: 6 % invalid, an energy of nearly four times the least one, and Gmsh did not
 /// end).
-const TANGLED: f64 = 0.05;
+pub(super) const TANGLED: f64 = 0.05;
 
 /// From here on a chart cannot be meshed at all, and any cut is better than none. In most such maps a hundredth of the
 /// area is invalid before it is untangled: in 8 of 40 charts of imu_adis16480, and 5 of rear_case.
@@ -87,20 +86,8 @@ const UNROLLED: f64 = 1.1;
 /// came off one after another, and then the rest was cut in two.
 const PEELED: f64 = 0.875;
 
-/// Parts of no more triangles than this are joined to neighbours, where that can be.
-const SMALL: usize = 64;
-
-/// Corners of parts that are sharper than this, in radians (6 degrees), are given away: elements there have a gamma below 0.1.
-const SHARP: f64 = 0.1;
-
-/// How often all corners are looked at: what is given away may leave another sharp corner, at most.
-const ROUNDS: usize = 3;
-
-/// What the map of two joined parts may stretch.
-const JOINED: f64 = 3.0;
-
 /// A chart and its map.
-type Mapped = (Chart, Maps);
+pub(super) type Mapped = (Chart, Maps);
 
 /// What cutting needs to know beside the chart.
 pub(super) struct Cutter<'a> {
@@ -147,7 +134,7 @@ impl Cutter<'_> {
                 if let Some((parts, naturals)) = self.parts_within(chart, map, bound, most)?
                     && (bound == GOOD || naturals > 0)
                 {
-                    return Ok(Some(self.joined(chart, parts)?));
+                    return Ok(Some(joined(self, chart, parts)?));
                 }
             }
         }
@@ -166,7 +153,7 @@ impl Cutter<'_> {
             return Ok(None);
         }
         let parts = self.parts_within(chart, map, EVEN, most)?;
-        parts.map(|(parts, _)| self.joined(chart, parts)).transpose()
+        parts.map(|(parts, _)| joined(self, chart, parts)).transpose()
     }
 
     /// The two strips into which a ring falls, where both are unrolled without stretching, as the wall of a cylinder is; none
@@ -249,91 +236,6 @@ impl Cutter<'_> {
             }
         }
         Ok(Some((done, naturals)))
-    }
-
-    /// Joins small parts of `chart` to neighbours as long as the map of both together suits a mesher: needles make cuts
-    /// that leave single triangles, and meshers need an element for each of their corners. Every join leaves fewer parts.
-    pub(super) fn joined(&self, chart: &Chart, parts: Vec<Mapped>) -> Result<Vec<Mapped>, ChartError> {
-        let local = |face: &FaceId| chart.faces().partition_point(|f| f < face);
-        let mut parts: Vec<Option<Mapped>> = parts.into_iter().map(Some).collect();
-        let mut owner = vec![0; chart.faces().len()];
-        for (k, part) in parts.iter().enumerate() {
-            part.iter().flat_map(|(chart, _)| chart.faces()).for_each(|f| owner[local(f)] = k);
-        }
-        let mut waiting: Vec<usize> = (0..parts.len()).collect();
-        let size = |parts: &[Option<Mapped>], k: usize| parts[k].as_ref().map_or(0, |(c, _)| c.triangles().len());
-        // The last one is the smallest.
-        waiting.sort_by_key(|k| std::cmp::Reverse(size(&parts, *k)));
-        while let Some(k) = waiting.pop() {
-            if size(&parts, k) == 0 || size(&parts, k) > SMALL {
-                continue;
-            }
-            for other in neighbours(chart, &owner, k) {
-                if let Some(joined) = self.join(chart, &owner, &[k, other])? {
-                    owner.iter_mut().filter(|o| **o == other).for_each(|o| *o = k);
-                    parts[other] = None;
-                    parts[k] = Some(joined);
-                    waiting.push(k);
-                    break;
-                }
-            }
-        }
-        self.blunt(chart, &mut owner, &mut parts)?;
-        Ok(parts.into_iter().flatten().collect())
-    }
-
-    /// Gives the triangles at the sharp corners of parts to a neighbour, where both have maps that suit a mesher then: no element
-    /// is any good in a corner like that. Each corner is looked at once in a round.
-    fn blunt(&self, chart: &Chart, owner: &mut [usize], parts: &mut [Option<Mapped>]) -> Result<(), ChartError> {
-        let stars = Stars::new(chart.triangles(), chart.vertices().len());
-        for _ in 0..ROUNDS {
-            let mut any = false;
-            for v in (0..chart.vertices().len()).map(VertexId::at) {
-                for corner in sharp_corners(chart, &stars, owner, v) {
-                    any |= self.give_away(chart, owner, parts, &corner)?;
-                }
-            }
-            if !any {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Gives the triangles in a corner to the first neighbour that can take them; whether there was one.
-    fn give_away(
-        &self,
-        chart: &Chart,
-        owner: &mut [usize],
-        parts: &mut [Option<Mapped>],
-        Corner { from, fan, beside }: &Corner,
-    ) -> Result<bool, ChartError> {
-        if fan.iter().any(|f| owner[f.index()] != *from) {
-            return Ok(false);
-        }
-        for to in beside {
-            fan.iter().for_each(|f| owner[f.index()] = *to);
-            if let Some(smaller) = self.join(chart, owner, &[*from])?
-                && let Some(larger) = self.join(chart, owner, &[*to])?
-            {
-                (parts[*from], parts[*to]) = (Some(smaller), Some(larger));
-                return Ok(true);
-            }
-        }
-        fan.iter().for_each(|f| owner[f.index()] = *from);
-        Ok(false)
-    }
-
-    /// These parts of `chart` as one, if its map suits a mesher.
-    fn join(&self, chart: &Chart, owner: &[usize], parts: &[usize]) -> Result<Option<Mapped>, ChartError> {
-        let faces: Vec<FaceId> = (0..owner.len()).filter(|f| parts.contains(&owner[*f])).map(FaceId::at).collect();
-        let Some(joined) = decompose::part_of(chart, &faces).filter(|joined| decompose::contact(joined).is_none())
-        else {
-            return Ok(None);
-        };
-        let map = natural_maps(&joined, self.settings.order, self.monitor)?;
-        let suits = |map: &Maps| map.conformal_p99(&joined) <= JOINED && map.invalid_share(&joined) <= TANGLED;
-        Ok(map.filter(suits).map(|map| (joined, map)))
     }
 
     /// Maps a chart, or splits it once where it touches itself in space, cannot be mapped, or would be too distorted.
@@ -427,60 +329,6 @@ fn marked(chart: &Chart, parts: Vec<Chart>) -> Vec<(Chart, bool)> {
     parts.into_iter().map(mark).collect()
 }
 
-/// A corner of a part that is sharper than [`SHARP`].
-struct Corner {
-    /// The part.
-    from: usize,
-    /// Its triangles at the corner; it has more.
-    fan: Vec<FaceId>,
-    /// The parts beside them at the corner, that with the longest edge in common first.
-    beside: Vec<usize>,
-}
-
-/// The sharp corners of parts at a vertex.
-fn sharp_corners(chart: &Chart, stars: &Stars, owner: &[usize], v: VertexId) -> Vec<Corner> {
-    let around: Vec<FaceId> = stars.around(v.index()).iter().map(|f| FaceId(*f)).collect();
-    let mut of_parts: Vec<usize> = around.iter().map(|f| owner[f.index()]).collect();
-    of_parts.sort_unstable();
-    of_parts.dedup();
-    if of_parts.len() < 2 {
-        return vec![];
-    }
-    let angle = |f: &FaceId| {
-        let angles = chart.shapes()[f.index()].angles();
-        (0..3).filter(|k| chart.triangles()[f.index()][*k] == v).map(|k| angles[k]).sum::<f64>()
-    };
-    let mut corners = Vec::new();
-    for from in of_parts {
-        let fan: Vec<FaceId> = around.iter().copied().filter(|f| owner[f.index()] == from).collect();
-        let is_all = owner.iter().filter(|o| **o == from).nth(fan.len()).is_none();
-        if is_all || fan.iter().map(angle).sum::<f64>() >= SHARP {
-            continue;
-        }
-        let sides = fan.iter().flat_map(|f| f.sides()).filter(|h| [chart.from(*h), chart.from(h.next())].contains(&v));
-        let beyond = sides.filter_map(|h| Some((chart.length(h), owner[chart.edges().twin(h)?.face().index()])));
-        let mut beside: Vec<(f64, usize)> = beyond.filter(|(_, to)| *to != from).collect();
-        beside.sort_by(|a, b| b.0.total_cmp(&a.0));
-        corners.push(Corner { from, fan, beside: beside.into_iter().map(|(_, to)| to).collect() });
-    }
-    corners
-}
-
-/// The parts beside part `k`, those first that it has the most boundary in common with.
-fn neighbours(chart: &Chart, owner: &[usize], k: usize) -> Vec<usize> {
-    let mut shared: BTreeMap<usize, f64> = BTreeMap::new();
-    for (_, sides) in chart.edges().iter() {
-        let &[g, h] = sides else { continue };
-        let [of_g, of_h] = [g, h].map(|side| owner[side.face().index()]);
-        if of_g != of_h && (of_g == k || of_h == k) {
-            *shared.entry(if of_g == k { of_h } else { of_g }).or_insert(0.0) += chart.length(g);
-        }
-    }
-    let mut all: Vec<(usize, f64)> = shared.into_iter().collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    all.into_iter().map(|(other, _)| other).collect()
-}
-
 /// Whether a chart has a natural map that stretches hardly, and scales areas by no more than `most`.
 fn unrolls(chart: &Chart, map: &Maps, most: f64) -> bool {
     map.boundary == BoundaryFound::Natural
@@ -505,50 +353,4 @@ fn left_of_hole(chart: &Chart, map: &Maps) -> Option<Vec<bool>> {
         along[0] * from[1] > along[1] * from[0]
     };
     Some(start.map().cells.iter().map(is_left).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::mesh::TriangleSoup;
-    use crate::monitor::NoMonitor;
-    use crate::{decompose, repair};
-
-    /// A square whose lower side is a needle with its tip at the origin, and a triangle beyond its short side.
-    fn with_needle() -> Chart {
-        let points =
-            vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.05, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0]];
-        let soup = TriangleSoup::new(points, vec![[0, 1, 2], [1, 5, 2], [0, 2, 3], [0, 3, 4]]).expect("sound");
-        let mesh = repair(&soup, &Default::default()).expect("a surface").mesh;
-        decompose::assemble(&mesh, &[0; 4]).expect("one chart").into_charts().remove(0)
-    }
-
-    #[test]
-    fn sharp_corners_of_parts_are_given_to_their_neighbours() {
-        let (chart, settings) = (with_needle(), ChartSettings::default());
-        let cutter = Cutter { settings: &settings, monitor: &NoMonitor };
-        let mut owner = vec![0, 0, 1, 1];
-        let part = |owner: &[usize], k| cutter.join(&chart, owner, &[k]).expect("nobody interrupts");
-        let mut parts = vec![part(&owner, 0), part(&owner, 1)];
-        assert!(parts.iter().all(Option::is_some));
-        cutter.blunt(&chart, &mut owner, &mut parts).expect("nobody interrupts");
-        assert_eq!(owner, [1, 0, 1, 1]);
-        let sizes: Vec<usize> = parts.iter().flatten().map(|(part, _)| part.triangles().len()).collect();
-        assert_eq!(sizes, [1, 3]);
-        // What is all of a part stays, and so does what is not sharp.
-        let stars = Stars::new(chart.triangles(), chart.vertices().len());
-        for v in (0..6).map(VertexId) {
-            assert!(sharp_corners(&chart, &stars, &[0, 1, 2, 3], v).is_empty());
-            assert!(sharp_corners(&chart, &stars, &owner, v).is_empty());
-        }
-    }
-
-    #[test]
-    fn small_parts_are_joined_where_one_map_suits_both() {
-        let (chart, settings) = (with_needle(), ChartSettings::default());
-        let cutter = Cutter { settings: &settings, monitor: &NoMonitor };
-        let part = |k| cutter.join(&chart, &[0, 1, 2, 3], &[k]).expect("nobody interrupts").expect("it maps");
-        let joined = cutter.joined(&chart, (0..4).map(part).collect()).expect("nobody interrupts");
-        assert_eq!(joined.len(), 1, "a flat chart is one part");
-    }
 }

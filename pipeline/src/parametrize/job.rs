@@ -1,6 +1,7 @@
 //! One chart through the stages: linear map, quadratic map, untangling, certificate.
 
 use super::cut::{Attempt, Cutter};
+use super::join::joined;
 use crate::atlas::Chart;
 use crate::certified::{BoundaryFound, CertifiedChart, Harmonic, LinearSummary, Provenance};
 use crate::certify::{self, CertifiedMap, PlanarMap, prove};
@@ -267,7 +268,7 @@ impl ChartJob {
         }
         // Joined parts have natural boundaries.
         match whole.filter(|_| settings.decompose.boundary == BoundaryShape::Natural) {
-            Some(whole) => cutter.joined(&whole, mapped),
+            Some(whole) => joined(&cutter, &whole, mapped),
             None => Ok(mapped),
         }
     }

@@ -10,6 +10,7 @@
 
 mod cut;
 mod job;
+mod join;
 mod survey;
 
 use crate::certified::{CertifiedAtlas, GatherError};

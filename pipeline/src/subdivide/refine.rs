@@ -24,7 +24,7 @@ use crate::grid::{GridPoint, orientation};
 use crate::measure::scale::uv_scale;
 use crate::mesh::SurfaceMesh;
 use crate::topology::{ChartId, FaceId, HalfEdgeId};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How often the four parts of a triangle may be split again. By experience: an edge is then of 512 parts, and a map that
 /// needs more had better be replaced by a plainer one.
@@ -274,7 +274,11 @@ impl<'a> Refiner<'a> {
     fn uv_at(&self, face: u32, at: [i64; 3]) -> GridPoint {
         let (chart, local) = self.owner[face as usize];
         let map = self.maps[chart as usize];
-        uv_at(map.cells[local as usize].map(|n| map.nodes[n as usize]), at)
+        let cell = &map.cells[local as usize];
+        match node_at(at) {
+            Some(k) => map.nodes[cell[k] as usize],
+            None => uv_at(cell.map(|n| map.nodes[n as usize]), at),
+        }
     }
 
     /// A chart in its straight triangles, and how many of its curved ones came apart into more than four.
@@ -288,8 +292,9 @@ impl<'a> Refiner<'a> {
             faces: Vec::with_capacity(map.cells.len()),
             uv_scale: uv_scale(charts, map),
         };
-        // Where nodes that are no vertices of the surface stand in the chart.
-        let mut middles: HashMap<u32, u32> = HashMap::new();
+        // Where middles of edges stand in the triangulation, and nodes between these.
+        let mut middles = vec![u32::MAX; map.nodes.len()];
+        let mut between: BTreeMap<u32, u32> = BTreeMap::new();
         let (mut leaves, mut refined) = (Vec::new(), 0);
         for (face, cell, f) in charts.faces().iter().zip(&map.cells).zip(0..).map(|((face, cell), f)| (face.0, cell, f))
         {
@@ -298,14 +303,23 @@ impl<'a> Refiner<'a> {
             self.leaves(face, &whole, &mut leaves);
             refined += usize::from(leaves.len() > 4);
             for part in &leaves {
-                built.triangles.push(part.map(|corner| match corner.at.iter().position(|at| *at == ONE) {
-                    Some(k) => cell[k],
-                    None => *middles.entry(corner.node).or_insert_with(|| {
-                        built.nodes.push(corner.node);
-                        built.uv.push(self.uv_at(face, corner.at));
-                        built.nodes.len() as u32 - 1
-                    }),
-                }));
+                let mut add = |corner: &Corner| {
+                    built.nodes.push(corner.node);
+                    built.uv.push(self.uv_at(face, corner.at));
+                    built.nodes.len() as u32 - 1
+                };
+                let triangle = part.map(|corner| match node_at(corner.at) {
+                    Some(k) if k < 3 => cell[k],
+                    Some(k) => {
+                        let middle = &mut middles[cell[k] as usize];
+                        if *middle == u32::MAX {
+                            *middle = add(&corner);
+                        }
+                        *middle
+                    }
+                    None => *between.entry(corner.node).or_insert_with(|| add(&corner)),
+                });
+                built.triangles.push(triangle);
                 built.faces.push(f);
             }
         }
@@ -325,11 +339,25 @@ impl<'a> Refiner<'a> {
 
 /// The side of a triangle that two of its corners are the ends of; none where these are corners of parts.
 fn side_between(a: Corner, b: Corner) -> Option<usize> {
-    let [from, to] = [a, b].map(|corner| corner.at.iter().position(|at| *at == ONE));
+    let [from, to] = [a, b].map(|corner| node_at(corner.at).filter(|node| *node < 3));
     match (from?, to?) {
         (0, 1) | (1, 0) => Some(0),
         (1, 2) | (2, 1) => Some(1),
         _ => Some(2),
+    }
+}
+
+/// Which of its six nodes a place in a curved triangle is.
+fn node_at(at: [i64; 3]) -> Option<usize> {
+    const HALF: i64 = ONE / 2;
+    match at {
+        [ONE, 0, 0] => Some(0),
+        [0, ONE, 0] => Some(1),
+        [0, 0, ONE] => Some(2),
+        [HALF, HALF, 0] => Some(3),
+        [0, HALF, HALF] => Some(4),
+        [HALF, 0, HALF] => Some(5),
+        _ => None,
     }
 }
 

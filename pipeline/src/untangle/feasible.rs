@@ -1,7 +1,7 @@
 //! The feasible path: a log-barrier method from the degree-elevated linear map.
 
 use super::bound::Bound;
-use super::interior::minimise;
+use super::interior::{Wanted, minimise};
 use super::objective::Objective;
 
 use super::problem::{Cell, Problem};
@@ -19,7 +19,7 @@ const KEPT: f64 = 1e-3;
 /// What triangles weigh at least, relative to the mean: where the objective is nothing a barrier is wanted all the same.
 const MIN_WEIGHT: f64 = 1e-6;
 
-/// Descends from `start`, the barrier at these shares of the objective in turn.
+/// Descends from `start`.
 ///
 /// # Errors
 /// [`Error`]: the systems are too large or cannot be factorised, or interrupted.
@@ -27,7 +27,7 @@ pub(super) fn untangle<O: Objective>(
     chart: &FilledChart,
     objective: &O,
     start: &[GridPoint],
-    shares: &[f64],
+    wanted: Wanted,
     stats: &mut Stats,
     checkpoint: &Checkpoint,
 ) -> Result<Vec<GridPoint>, Error> {
@@ -41,7 +41,7 @@ pub(super) fn untangle<O: Objective>(
         bound.scale = coefficient;
         bound.floor = KEPT * coefficient;
     });
-    descend(&mut problem, &mut x, shares, stats)?;
+    descend(&mut problem, &mut x, wanted, stats)?;
     for moved in problem.moved(&x) {
         all[moved.node] = moved.uv;
     }
@@ -98,7 +98,7 @@ fn problem<'a, O: Objective>(
 fn descend<O: Objective>(
     problem: &mut Problem<O>,
     x: &mut [[f64; 2]],
-    shares: &[f64],
+    wanted: Wanted,
     stats: &mut Stats,
 ) -> Result<(), Error> {
     if problem.unknowns() == 0 {
@@ -107,6 +107,6 @@ fn descend<O: Objective>(
     let pattern = problem.pattern();
     problem.checkpoint()?;
     let analysis = pattern.analyse()?;
-    stats.add(minimise(problem, &analysis, x, shares)?);
+    stats.add(minimise(problem, &analysis, x, wanted)?);
     Ok(())
 }

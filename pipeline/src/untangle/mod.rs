@@ -34,7 +34,7 @@ use crate::map::filled::FilledChart;
 use crate::map::quadratic::{self, QuadraticMap, invalid_triangles};
 use crate::monitor::{Checkpoint, Interrupted, Monitor};
 use crate::topology::FaceId;
-use interior::{LAST_WEIGHTS, WEIGHTS};
+use interior::{NEAR, NEAREST};
 pub use objective::{Dirichlet, Isometric, LocalModel, Objective};
 use patch::Stuck;
 
@@ -259,8 +259,7 @@ pub fn descend<O: Objective>(
 ) -> Result<Descended, Interrupted> {
     let mut stats = Stats::default();
     let energy_start = total_on_grid(chart, objective, start);
-    let lower = match feasible::untangle(chart, objective, start, &LAST_WEIGHTS, &mut stats, &Checkpoint::new(monitor))
-    {
+    let lower = match feasible::untangle(chart, objective, start, NEAR, &mut stats, &Checkpoint::new(monitor)) {
         Ok(nodes) => {
             let energy = total_on_grid(chart, objective, &nodes);
             valid(chart, &nodes).filter(|_| energy < energy_start).map(|centres| (nodes, centres, energy))
@@ -331,7 +330,7 @@ fn best<O: Objective>(
     }
     // Steps are counted over all paths, but accuracy is that of the path that is taken.
     stats.decrement = 0.0;
-    match feasible::untangle(chart, objective, start, &WEIGHTS, stats, checkpoint) {
+    match feasible::untangle(chart, objective, start, NEAREST, stats, checkpoint) {
         Ok(nodes) => {
             if let Some(found) = found_if_valid(Method::Feasible, nodes) {
                 return Ok(found);

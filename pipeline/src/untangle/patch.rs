@@ -5,7 +5,7 @@
 //! triangles with all vertices on the outer loop come to rest while they are still inverted.
 
 use super::bound::Bound;
-use super::interior::{WEIGHTS, minimise};
+use super::interior::{NEAREST, minimise};
 use super::objective::Objective;
 use super::problem::{Cell, Moved, Problem};
 use super::region;
@@ -291,6 +291,6 @@ fn relax<O: Objective>(problem: &mut Problem<O>, x: &mut [[f64; 2]], stats: &mut
     let pattern = problem.pattern();
     problem.checkpoint()?;
     let analysis = pattern.analyse()?;
-    stats.add(minimise(problem, &analysis, x, &WEIGHTS)?);
+    stats.add(minimise(problem, &analysis, x, NEAREST)?);
     Ok(())
 }

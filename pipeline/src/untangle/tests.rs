@@ -60,7 +60,7 @@ fn a_bent_disk_is_untangled_close_to_the_harmonic_map_on_both_paths() {
     let mut stats = Stats::default();
     let nodes = {
         let energy = Dirichlet::new(&chart);
-        feasible::untangle(&chart, &energy, &start, &WEIGHTS, &mut stats, &Checkpoint::new(&NoMonitor)).expect("small")
+        feasible::untangle(&chart, &energy, &start, NEAREST, &mut stats, &Checkpoint::new(&NoMonitor)).expect("small")
     };
     assert!(valid(&chart, &nodes).is_some());
     // Patches alone come as close to the lower bound as the whole chart does.
@@ -141,7 +141,7 @@ fn a_valid_target_is_reached() {
     assert!(harmonic.invalid().is_empty());
     let distance = Distance { chart: &chart, target: harmonic.uv().to_vec() };
     let (mut stats, checkpoint) = (Stats::default(), Checkpoint::new(&NoMonitor));
-    let nodes = feasible::untangle(&chart, &distance, &start, &WEIGHTS, &mut stats, &checkpoint).expect("small");
+    let nodes = feasible::untangle(&chart, &distance, &start, NEAREST, &mut stats, &checkpoint).expect("small");
     let [before, after] = [&start, &nodes].map(|n| total_on_grid(&chart, &distance, n));
     assert!(after < 1e-9 * before, "{before} {after}");
 }
@@ -158,7 +158,8 @@ fn a_valid_minimiser_of_another_objective_is_the_result() {
     assert_eq!((got.report.method, got.report.energy, got.nodes), (Method::Harmonic, 0.0, start));
 }
 
-/// Begun at the linear map, no move of a few nodes brings what is found nearer to an isometry.
+/// Begun at the linear map, what is found is as near to an isometry as where the method comes to rest, up to what nobody sees; there
+/// no move of a few nodes brings it nearer.
 #[test]
 fn the_isometric_objective_comes_to_rest_inside_the_valid_maps() {
     let (chart, start, harmonic) = prepared(&shapes::bent_disk(8, 0.45, 1.0));
@@ -173,16 +174,21 @@ fn the_isometric_objective_comes_to_rest_inside_the_valid_maps() {
     assert_eq!(got.energy, total_on_grid(&chart, &objective, &got.nodes));
     let least = objective.of_isometry(chart.shapes().iter().map(|s| s.area()).sum());
     assert!(least < got.energy && got.energy < 0.9 * got.energy_start, "{least} {} {}", got.energy, got.energy_start);
-    assert!(got.gradient_norm <= 1e-5 && got.iterations < 80, "{} {}", got.gradient_norm, got.iterations);
+    let (mut stats, checkpoint) = (Stats::default(), Checkpoint::new(&NoMonitor));
+    let patient = interior::Wanted { idle: None, ..NEAR };
+    let rest = feasible::untangle(&chart, &objective, &start, patient, &mut stats, &checkpoint).expect("small");
+    let at_rest = total_on_grid(&chart, &objective, &rest);
+    assert!(got.energy < (1.0 + 2e-3) * at_rest && got.iterations < 40, "{} {at_rest}", got.energy);
+    assert!(stats.decrement.sqrt() <= 1e-5 && stats.iterations < 80, "{stats:?}");
     let is_outer = chart.outer_nodes();
     let mut random = shapes::Random(11);
     for _ in 0..50 {
-        let mut moved = uv_of(&got.nodes, &[]);
+        let mut moved = uv_of(&rest, &[]);
         for (p, _) in moved.iter_mut().zip(&is_outer).filter(|(_, is_outer)| !**is_outer) {
             *p = p.map(|c| c + 1e-5 * random.symmetric());
         }
-        let gained = got.energy - total(&chart, &objective, &moved);
-        assert!(gained < 1e-5 * got.energy, "{gained}");
+        let gained = at_rest - total(&chart, &objective, &moved);
+        assert!(gained < 1e-5 * at_rest, "{gained}");
     }
 }
 

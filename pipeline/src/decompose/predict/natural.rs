@@ -162,18 +162,28 @@ const LINES: usize = 48;
 /// The share of the plane inside an outline that it surrounds more than once, or the wrong way round: on some lines across it.
 fn overlap(outline: &[[f64; 2]]) -> f64 {
     let (low, high) = outline.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[1]), h.max(p[1])));
-    let (mut inside, mut wrong) = (0.0, 0.0);
-    let mut crossings: Vec<(f64, i32)> = Vec::new();
-    for line in 0..LINES {
-        let y = low + (high - low) * (line as f64 + 0.5) / LINES as f64;
-        crossings.clear();
-        let following = outline.iter().cycle().skip(1);
-        for (p, q) in outline.iter().zip(following) {
+    let step = (high - low) / LINES as f64;
+    let height = |line: usize| low + step * (line as f64 + 0.5);
+    // The first line above a height, or just below it as rounding has it.
+    let first = |y: f64| (((y - low) / step - 1.0).floor().max(0.0) as usize).min(LINES);
+    // Where the outline crosses each line, and in which direction.
+    let mut crossings: [Vec<(f64, i32)>; LINES] = [const { Vec::new() }; LINES];
+    let following = outline.iter().cycle().skip(1);
+    for (p, q) in outline.iter().zip(following) {
+        let direction = if q[1] > p[1] { -1 } else { 1 };
+        for line in first(p[1].min(q[1]))..LINES {
+            let y = height(line);
+            if y > p[1].max(q[1]) {
+                break;
+            }
             if (p[1] <= y) != (q[1] <= y) {
                 let x = p[0] + (q[0] - p[0]) * (y - p[1]) / (q[1] - p[1]);
-                crossings.push((x, if q[1] > p[1] { -1 } else { 1 }));
+                crossings[line].push((x, direction));
             }
         }
+    }
+    let (mut inside, mut wrong) = (0.0, 0.0);
+    for crossings in &mut crossings {
         crossings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut winding = 0;
         for pair in crossings.windows(2) {
