@@ -146,53 +146,122 @@ fn not_mapped(error: ChartError) -> Abort {
     Reason::new(code, error).into()
 }
 
-/// Puts the charts of a surface together, `whole` of which decomposition made; returns what is known of the atlas then, and
-/// the files of the result. `labels` are those of the input.
+/// Puts the charts of a surface together.
+///
+/// # Errors
+/// A fault of planish.
+pub fn gather(mesh: SurfaceMesh, charts: Vec<CertifiedChart>, settings: &Settings) -> Result<CertifiedAtlas, Abort> {
+    let atlas = CertifiedAtlas::gather(mesh, charts, settings.size).map_err(internal)?;
+    atlas.charts().iter().for_each(warn_if_unsolved);
+    Ok(atlas)
+}
+
+/// Files of a result that are encoded together. Each kind needs nothing of the others: they can be encoded at the same time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// surface.vtu.
+    Surface,
+    /// param.vtu.
+    Param,
+    /// What else ParaView shows: seams, parts with labels, and the file that opens all.
+    Beside,
+    /// A file for another program.
+    Also(Also),
+    /// What a mesher gets.
+    HandOff,
+}
+
+/// What a kind of files came to.
+#[derive(Debug, Default)]
+pub struct Encoded {
+    /// Names and contents.
+    files: Files,
+    /// What the report says of them.
+    outputs: Vec<Output>,
+    /// The account of the hand-off.
+    hand_off: Option<report::ExportReport>,
+}
+
+/// What a result consists of, in the order of its files.
+pub fn encodings(settings: &Settings) -> Vec<Encoding> {
+    let mut encodings = vec![Encoding::Surface, Encoding::Param, Encoding::Beside];
+    encodings.extend(settings.also.iter().map(|also| Encoding::Also(*also)));
+    if settings.hand_off == settings::ExportTarget::Gmsh {
+        encodings.push(Encoding::HandOff);
+    }
+    encodings
+}
+
+/// Encodes files of one kind. `labels` are those of the input.
 ///
 /// # Errors
 /// Where the result cannot be encoded, a fault of planish; the refusal of a surface that a file asked for cannot hold; or that
 /// it is no longer wanted.
-pub fn assemble(
-    mesh: SurfaceMesh,
-    charts: Vec<CertifiedChart>,
-    whole: usize,
+pub fn encode(
+    encoding: Encoding,
+    atlas: &CertifiedAtlas,
     labels: &[Label],
     settings: &Settings,
     monitor: &dyn Monitor,
-) -> Result<(CertifiedFacts, Files), Abort> {
-    let charts_by_splitting = charts.len() - whole;
-    let atlas = CertifiedAtlas::gather(mesh, charts, settings.size).map_err(internal)?;
-    atlas.charts().iter().for_each(warn_if_unsolved);
-    let mut files = encode(&atlas, labels)?;
-    for also in &settings.also {
-        files.push(encode_also(*also, &atlas, labels)?);
-    }
-    let mut hand_off = None;
-    if settings.hand_off == settings::ExportTarget::Gmsh {
-        let least = settings.size_min.unwrap_or(0.0);
-        let size = settings.size.unwrap_or_else(|| atlas.mesh().default_size().max(least));
-        let features = settings.feature_angle.filter(|_| settings.names_features);
-        let sizes = export::Sizes {
-            size,
-            min: least.min(size),
-            per_turn: settings.size_curvature,
-            deviation: settings.deviation,
-            gradation: settings.gradation,
-        };
-        let wanted = export::Wanted { sizes, labels, features, order: settings.mesh_order };
-        let export = export::gmsh(&atlas, &wanted, monitor).map_err(|Interrupted| Abort::Unwanted)?;
-        files.extend(export.files);
-        hand_off = Some(export.report);
+) -> Result<Encoded, Abort> {
+    let (files, hand_off) = match encoding {
+        Encoding::Surface => (vec![(result_files::SURFACE.to_owned(), vtu::surface(atlas, labels))], None),
+        Encoding::Param => (vec![(result_files::PARAM.to_owned(), vtu::param(atlas, labels))], None),
+        Encoding::Beside => (encode_beside(atlas, labels)?, None),
+        Encoding::Also(also) => (vec![encode_also(also, atlas, labels)?], None),
+        Encoding::HandOff => {
+            let export = hand_off(atlas, labels, settings, monitor)?;
+            (export.files, Some(export.report))
+        }
+    };
+    let outputs = files.iter().map(|(name, content)| Output::of(name, content)).collect();
+    Ok(Encoded { files, outputs, hand_off })
+}
+
+/// What a mesher gets, as the settings say.
+fn hand_off(
+    atlas: &CertifiedAtlas,
+    labels: &[Label],
+    settings: &Settings,
+    monitor: &dyn Monitor,
+) -> Result<export::Export, Abort> {
+    let least = settings.size_min.unwrap_or(0.0);
+    let size = settings.size.unwrap_or_else(|| atlas.mesh().default_size().max(least));
+    let features = settings.feature_angle.filter(|_| settings.names_features);
+    let sizes = export::Sizes {
+        size,
+        min: least.min(size),
+        per_turn: settings.size_curvature,
+        deviation: settings.deviation,
+        gradation: settings.gradation,
+    };
+    let wanted = export::Wanted { sizes, labels, features, order: settings.mesh_order };
+    export::gmsh(atlas, &wanted, monitor).map_err(|Interrupted| Abort::Unwanted)
+}
+
+/// What is known of an atlas of which all files are `encoded`, in the order of [`encodings`], and these. `whole` is how many charts
+/// decomposition made; `labels` are those of the input.
+pub fn assemble(
+    atlas: &CertifiedAtlas,
+    whole: usize,
+    labels: &[Label],
+    encoded: Vec<Encoded>,
+) -> (CertifiedFacts, Files) {
+    let (mut files, mut outputs, mut hand_off) = (Files::new(), Vec::new(), None);
+    for one in encoded {
+        files.extend(one.files);
+        outputs.extend(one.outputs);
+        hand_off = hand_off.or(one.hand_off);
     }
     let facts = CertifiedFacts {
-        labels: report::labels(&atlas, labels),
-        charts: report::charts(&atlas),
-        charts_by_splitting,
+        labels: report::labels(atlas, labels),
+        charts: report::charts(atlas),
+        charts_by_splitting: atlas.charts().len() - whole,
         seams: report::seams(atlas.seams()),
         hand_off,
-        outputs: files.iter().map(|(name, content)| Output::of(name, content)).collect(),
+        outputs,
     };
-    Ok((facts, files))
+    (facts, files)
 }
 
 /// Maps the charts of an atlas that was made otherwise, and puts them together; returns the report and the files of its
@@ -209,7 +278,12 @@ pub fn finish(input: Input, found: Repaired, atlas: Atlas, settings: &Settings) 
     for chart in atlas.into_charts() {
         done.extend(ChartJob::new(chart, of_charts).run(&NoMonitor).map_err(not_mapped)?);
     }
-    let (certified, files) = assemble(found.mesh, done, whole, &[], settings, &NoMonitor)?;
+    let atlas = gather(found.mesh, done, settings)?;
+    let mut encoded = Vec::new();
+    for encoding in encodings(settings) {
+        encoded.push(encode(encoding, &atlas, &[], settings, &NoMonitor)?);
+    }
+    let (certified, files) = assemble(&atlas, whole, &[], encoded);
     Ok((facts.certified(settings, certified), files))
 }
 
@@ -219,13 +293,9 @@ fn warn_if_unsolved(certified: &CertifiedChart) {
     }
 }
 
-/// Encodes what ParaView shows.
-fn encode(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Files, Reason> {
-    let mut files = vec![
-        (result_files::SURFACE.to_owned(), vtu::surface(atlas, labels)),
-        (result_files::PARAM.to_owned(), vtu::param(atlas, labels)),
-        (result_files::SEAMS.to_owned(), vtp::seams(atlas, labels).map_err(not_encoded)?),
-    ];
+/// Encodes what else ParaView shows.
+fn encode_beside(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Files, Reason> {
+    let mut files = vec![(result_files::SEAMS.to_owned(), vtp::seams(atlas, labels).map_err(not_encoded)?)];
     let mut parts = Vec::new();
     for (label, Label { name, group, .. }) in labels.iter().enumerate() {
         let file = result_files::surface_of(group);

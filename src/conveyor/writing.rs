@@ -6,14 +6,17 @@ use super::stage::Stage;
 use super::{Chained, Finished, log, published, unwritten};
 use crate::outcome::{Abort, Code, Reason};
 use crate::output::publish::{self, PublishError, Publisher, Staged};
-use crate::report::Report;
+use crate::report::{Facts, Report};
 use crate::result_files;
-use crate::stages::{self, Files};
+use crate::stages::{self, Encoded, Files};
 use crate::system::passing;
 use bytesize::ByteSize;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
+use planish_core::CertifiedChart;
+use planish_core::mesh::SurfaceMesh;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 /// Results that could not be written are looked after this often.
@@ -72,15 +75,8 @@ pub(super) fn write(finished: Finished, after: &After) {
         Finished::Surface(surface) => {
             let (facts, done) = surface.collect();
             let in_flight = surface.in_flight.clone();
-            let assembled = in_flight.compute(Stage::Write, |monitor| {
-                let (mesh, charts) = done?;
-                let charts = charts.into_iter().flatten().collect();
-                let labels = facts.content.as_ref().map_or(&[][..], |content| &content.labels);
-                let (certified, files) =
-                    stages::assemble(mesh, charts, surface.whole, labels, &in_flight.settings, monitor)?;
-                let report = facts.clone().certified(&in_flight.settings, certified);
-                Ok((report, not_too_large(files, &in_flight)?))
-            });
+            let whole = surface.whole;
+            let assembled = done.and_then(|done| assembled(&in_flight, &facts, done, whole));
             (in_flight, facts, assembled)
         }
     };
@@ -100,6 +96,41 @@ pub(super) fn write(finished: Finished, after: &After) {
             unwritten(&in_flight, PublishError::Report(error));
         }
     }
+}
+
+/// The report of a surface of these charts, and its files.
+///
+/// These are encoded at the same time, on threads of their own, each of which has a place to compute; this one has none while it
+/// waits for them.
+fn assembled(
+    in_flight: &InFlight,
+    facts: &Facts,
+    (mesh, charts): (SurfaceMesh, Vec<Vec<CertifiedChart>>),
+    whole: usize,
+) -> Result<(Report, Files), Abort> {
+    let settings = &in_flight.settings;
+    let labels = facts.content.as_ref().map_or(&[][..], |content| &content.labels);
+    let atlas =
+        in_flight.compute(Stage::Write, |_| stages::gather(mesh, charts.into_iter().flatten().collect(), settings))?;
+    let encoding = |one| in_flight.compute(Stage::Write, |m| stages::encode(one, &atlas, labels, settings, m));
+    let encoded: Result<Vec<Encoded>, Abort> = std::thread::scope(|scope| {
+        let encoding = &encoding;
+        let start = |one| {
+            (one, std::thread::Builder::new().name("encode".to_owned()).spawn_scoped(scope, move || encoding(one)))
+        };
+        let threads: Vec<_> = stages::encodings(settings).into_iter().map(start).collect();
+        // Where the system gives no thread, this one does it; a panic was caught where it happened.
+        let end = |(one, thread): (_, std::io::Result<ScopedJoinHandle<_>>)| match thread.map(ScopedJoinHandle::join) {
+            Ok(Ok(encoded)) => encoded,
+            Ok(Err(_)) | Err(_) => encoding(one),
+        };
+        threads.into_iter().map(end).collect()
+    });
+    let encoded = encoded?;
+    in_flight.compute(Stage::Write, |_| {
+        let (certified, files) = stages::assemble(&atlas, whole, labels, encoded);
+        Ok((facts.clone().certified(settings, certified), not_too_large(files, in_flight)?))
+    })
 }
 
 /// The files, unless they are too large together.

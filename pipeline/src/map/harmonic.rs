@@ -261,7 +261,8 @@ mod tests {
                 [turn.cos(), turn.sin()]
             };
             let exact = harmonic_map::<P2, 6>(&filled, on_outer, &NoMonitor).expect("solves");
-            let found = iterated_harmonic_map(&filled, on_outer, true, &NoMonitor).expect("solves").expect("comes to rest");
+            let found =
+                iterated_harmonic_map(&filled, on_outer, true, &NoMonitor).expect("solves").expect("comes to rest");
             let off = exact.iter().zip(&found).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
             assert!(off < 1e-9, "{off:.1e} of {} triangles", soup.triangles().len());
         }
