@@ -56,8 +56,9 @@ type Part = [Corner; 3];
 /// of the six anchors with 100,000 triangles has a third of the triangles, and no mesh is worse for it.
 const BEND: f64 = 1.0 / 32.0;
 
-/// Charts of fewer triangles are split into four everywhere: it costs nothing, and coarse maps gain most by it.
-pub(super) const FEW: usize = 200;
+/// Charts of fewer triangles are split into four everywhere: it costs next to nothing, and what Gmsh makes of coarse triangles depends
+/// on where their sides are halved (a flat square of 200: edges a sixth too short at its coarse end).
+pub(super) const FEW: usize = 500;
 
 /// Triangulates all charts by straight triangles that turn left; in those that are `fine` no triangle stays whole. Returns
 /// the charts, and how many curved triangles were split into more than four.

@@ -58,7 +58,7 @@ impl<'a, 'b> System<'a, 'b> {
     }
 
     fn solve(&self) -> Option<Vec<[f64; 2]>> {
-        let mut laplacian = GraphLaplacian::new(self.unknowns);
+        let mut laplacian = GraphLaplacian::new(self.union.cells(), self.unknowns - self.union.cells());
         self.links().for_each(|(pair, w)| laplacian.add_edge(*pair, *w));
         self.rim.iter().for_each(|(i, w, uv)| laplacian.add_dirichlet(*i, *w, *uv));
         laplacian.solve()

@@ -41,7 +41,7 @@ impl NaturalMap {
 /// Per cell, the logarithm of the scale of lengths.
 fn log_scales(union: &CellUnion, outer: usize) -> Option<Vec<f64>> {
     let holes = union.loops.len() - 1;
-    let mut laplacian = GraphLaplacian::new(union.cells() + holes);
+    let mut laplacian = GraphLaplacian::new(union.cells(), holes);
     union.links.iter().for_each(|(pair, w)| laplacian.add_edge(*pair, *w));
     for (i, curvature) in curvatures(union).into_iter().enumerate() {
         laplacian.add_load(i as u32, [-curvature, 0.0]);
