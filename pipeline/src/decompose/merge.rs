@@ -122,10 +122,10 @@ impl Merge<'_, '_> {
     /// A legal union. Its ratio is not known yet: it is taken to be that of its parts, as solving for it costs most,
     /// and many candidates are overtaken before.
     fn candidate(&mut self, (a, b): (u32, u32), version: &[u32]) -> Option<Candidate> {
-        if self.groups[a as usize] != self.groups[b as usize] {
+        if self.groups[a as usize] != self.groups[b as usize] || self.are_faces_apart((a, b)) {
             return None;
         }
-        let union = self.regions.union(a, b).filter(|u| self.is_allowed((a, b), u))?;
+        let union = self.regions.union(a, b).filter(|u| self.is_allowed(u))?;
         let ratio = self.ratios[a as usize].max(self.ratios[b as usize]);
         let versions = (version[a as usize], version[b as usize]);
         Some(Candidate { cost: self.cost((a, b), &union, ratio), pair: (a, b), versions, ratio: None })
@@ -144,25 +144,33 @@ impl Merge<'_, '_> {
     }
 
     /// Whether the union may be a chart, its distortion apart.
-    fn is_allowed(&self, (a, b): (u32, u32), union: &Union) -> bool {
+    fn is_allowed(&self, union: &Union) -> bool {
         let shape = self.regions.shape(&union.region, &union.outline);
-        if !self.limits.allow(&shape) {
-            return false;
-        }
-        let is_across_feature = 2.0 * union.shared_feature > union.shared;
-        !is_across_feature || !self.is_face(a) || !self.is_face(b)
+        self.limits.allow(&shape)
+    }
+
+    /// Whether two regions meet in a feature, and are faces. That costs no more than the smaller of them: a plate with n holes has n
+    /// neighbours, and n times as much around it.
+    fn are_faces_apart(&self, (a, b): (u32, u32)) -> bool {
+        let (shared, feature) = self.regions.shared(a, b);
+        2.0 * feature > shared && self.is_face(a) && self.is_face(b)
     }
 
     /// Whether features keep a region apart: what has little of them around it is no face of its own, unless it is flat.
     fn is_face(&self, region: u32) -> bool {
         let is_kept = |c: &u32| self.regions.complex.cells[*c as usize].is_kept;
-        self.sharp_outline(region) >= self.min_outline || self.regions.all[region as usize].cells.iter().any(is_kept)
+        self.is_sharp(region) || self.regions.all[region as usize].cells.iter().any(is_kept)
     }
 
-    /// The length of the features around a region, weighed by their sharpness.
-    fn sharp_outline(&self, region: u32) -> f64 {
-        let region = &self.regions.all[region as usize];
-        region.boundary.iter().map(|arc| self.regions.complex.arcs[*arc as usize].sharp).sum()
+    /// Whether the features around a region, weighed by their sharpness, are long enough.
+    fn is_sharp(&self, region: u32) -> bool {
+        let mut sum = 0.0;
+        // As far as that takes: most regions have many more.
+        self.min_outline <= 0.0
+            || self.regions.all[region as usize].boundary.iter().any(|arc| {
+                sum += self.regions.complex.arcs[*arc as usize].sharp;
+                sum >= self.min_outline
+            })
     }
 
     fn cost(&self, (a, b): (u32, u32), union: &Union, ratio: f64) -> f64 {

@@ -52,9 +52,8 @@ pub(super) struct Shape {
 pub(super) struct Union {
     pub region: Region,
     pub outline: Outline,
-    /// Length of the boundary that vanishes, and of that part of it that is a feature.
+    /// Length of the boundary that vanishes.
     pub shared: f64,
-    pub shared_feature: f64,
 }
 
 /// A partition of the cells into regions.
@@ -178,6 +177,16 @@ impl<'a> Regions<'a> {
         }
     }
 
+    /// The length of the arcs between two regions, and how much of it is a feature.
+    pub(super) fn shared(&self, a: u32, b: u32) -> (f64, f64) {
+        // From the side on which there is less to look at. Lengths are the same from either.
+        let count = |region: u32| self.all[region as usize].boundary.len();
+        let (fewer, other) = if count(a) <= count(b) { (a, b) } else { (b, a) };
+        let between = self.all[fewer as usize].boundary.iter().filter(|h| self.beyond(**h) == Some(other));
+        let arcs = between.map(|h| &self.complex.arcs[*h as usize]);
+        arcs.fold((0.0, 0.0), |(length, feature), arc| (length + arc.length, feature + arc.feature))
+    }
+
     /// What the union of `a` and `b` would be; none where they share no arc.
     pub(super) fn union(&mut self, a: u32, b: u32) -> Option<Union> {
         let (ra, rb) = (&self.all[a as usize], &self.all[b as usize]);
@@ -188,7 +197,6 @@ impl<'a> Regions<'a> {
         boundary.extend(rb.boundary.iter().filter(|h| self.beyond(**h) != Some(a)));
         let closed = gone.iter().filter(|h| self.closes_corner(a, b, **h)).count();
         let shared = gone.iter().map(|h| self.complex.arcs[*h as usize].length).sum();
-        let shared_feature = gone.iter().map(|h| self.complex.arcs[*h as usize].feature).sum();
         let mut region = Region {
             cells: vec![],
             length: ra.length + rb.length - 2.0 * shared,
@@ -200,7 +208,7 @@ impl<'a> Regions<'a> {
         };
         let outline = self.outline(a, b, &boundary);
         region.boundary = boundary;
-        Some(Union { region, outline, shared, shared_feature })
+        Some(Union { region, outline, shared })
     }
 
     /// Makes the union of `a` and `b`, which becomes region `a`.

@@ -10,37 +10,23 @@ impl SeamNetwork {
     /// input; `None` where there are no two. Seams that meet in a corner are not compared: they come as close as
     /// one likes.
     ///
-    /// A search of pairs of polylines, halved again and again, for the closest pair of segments (branch and bound on
-    /// boxes around their halves).
+    /// A search of pairs of sets of seams, and then of polylines, halved again and again, for the closest pair of segments (branch
+    /// and bound on boxes around their halves): a plate with n holes has n^2 pairs of seams, of which it looks at a few for each.
     pub fn shortest_distance(&self, mesh: &SurfaceMesh) -> Option<f64> {
         let scale = mesh.metric().scale;
         let place = |v: &crate::topology::VertexId| mesh.points()[v.index()].map(|c| c * scale);
         let polyline = |c: &Curve| Polyline::new(c.vertices().iter().map(place).collect());
         let polylines: Vec<Polyline> = self.curves().iter().map(polyline).collect();
         let mut squared = f64::INFINITY;
-        for (i, j) in self.comparable_pairs() {
-            closest(&polylines[i], &polylines[j], &mut squared);
+        for chart in (0..self.loops.len()).map(ChartId::at) {
+            let seams = Seams::new(self.seams_beside(chart), &polylines);
+            seams.each_near_pair(&mut squared, |i, j, squared| {
+                if !self.share_an_end(i, j) {
+                    closest(&polylines[i], &polylines[j], squared);
+                }
+            });
         }
         squared.is_finite().then(|| squared.sqrt() / scale)
-    }
-
-    /// Pairs of seams beside a chart that share no end.
-    fn comparable_pairs(&self) -> Vec<(usize, usize)> {
-        let mut pairs = Vec::new();
-        for chart in (0..self.loops.len()).map(ChartId::at) {
-            let seams = self.seams_beside(chart);
-            for (k, i) in seams.iter().enumerate() {
-                for j in &seams[k + 1..] {
-                    if !self.share_an_end(*i, *j) {
-                        pairs.push((*i, *j));
-                    }
-                }
-            }
-        }
-        // Two charts may lie beside the same two seams.
-        pairs.sort_unstable();
-        pairs.dedup();
-        pairs
     }
 
     /// The seams that a chart's loops pass, by their positions among the curves, ascending.
@@ -57,6 +43,72 @@ impl SeamNetwork {
     fn share_an_end(&self, i: usize, j: usize) -> bool {
         let ends = self.curves[j].ends;
         self.curves[i].ends.iter().any(|end| ends.contains(end))
+    }
+}
+
+/// The seams beside a chart, halved along the axis in which they spread most, and so on, with boxes around all halves.
+struct Seams {
+    /// Their positions among the curves.
+    order: Vec<usize>,
+    boxes: Vec<BoundingBox>,
+}
+
+impl Seams {
+    fn new(order: Vec<usize>, polylines: &[Polyline]) -> Self {
+        let mut seams = Self { boxes: vec![EMPTY; 4 * order.len()], order };
+        if !seams.order.is_empty() {
+            seams.fill(seams.whole(), polylines);
+        }
+        seams
+    }
+
+    fn whole(&self) -> Range {
+        Range { first: 0, end: self.order.len(), at: 0 }
+    }
+
+    /// As deep as the logarithm of the number of seams.
+    fn fill(&mut self, range: Range, polylines: &[Polyline]) -> BoundingBox {
+        let of = |i: &usize| polylines[*i].boxes[0];
+        let seams = &mut self.order[range.first..range.end];
+        let around = BoundingBox::of(seams.iter().flat_map(|i| [of(i).min, of(i).max])).unwrap_or(EMPTY);
+        self.boxes[range.at] = around;
+        if range.len() > 1 {
+            let width = |k: usize| around.max[k] - around.min[k];
+            let axis = (1..3).fold(0, |best, k| if width(k) > width(best) { k } else { best });
+            let centre = |i: &usize| of(i).min[axis] + of(i).max[axis];
+            seams.sort_unstable_by(|a, b| centre(a).total_cmp(&centre(b)).then(a.cmp(b)));
+            for half in range.halves() {
+                self.fill(half, polylines);
+            }
+        }
+        around
+    }
+
+    /// Visits pairs of seams whose boxes are closer than `squared`, which the visits lower; the nearer ones first.
+    fn each_near_pair(&self, squared: &mut f64, mut visit: impl FnMut(usize, usize, &mut f64)) {
+        let mut open = if self.order.is_empty() { vec![] } else { vec![(self.whole(), self.whole())] };
+        let distance = |(r, s): &(Range, Range)| gap(&self.boxes[r.at], &self.boxes[s.at]);
+        // It ends: of every pair one range is halved.
+        while let Some((r, s)) = open.pop() {
+            if distance(&(r, s)) >= *squared {
+                continue;
+            }
+            match (r.len(), s.len()) {
+                (1, 1) if r.at == s.at => {}
+                (1, 1) => visit(self.order[r.first], self.order[s.first], squared),
+                _ if r.at == s.at => {
+                    let [a, b] = r.halves();
+                    open.extend([(a, b), (a, a), (b, b)]);
+                }
+                (n, m) => {
+                    let mut next = if n >= m { r.halves().map(|h| (h, s)) } else { s.halves().map(|h| (r, h)) };
+                    if distance(&next[0]) < distance(&next[1]) {
+                        next.swap(0, 1);
+                    }
+                    open.extend(next);
+                }
+            }
+        }
     }
 }
 
@@ -89,9 +141,8 @@ impl Range {
 impl Polyline {
     fn new(points: Vec<Vec3>) -> Self {
         let whole = Range { first: 0, end: points.len() - 1, at: 0 };
-        let empty = BoundingBox { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
         // Halves of n segments are numbered below 4 n.
-        let mut line = Self { boxes: vec![empty; 4 * whole.len()], points };
+        let mut line = Self { boxes: vec![EMPTY; 4 * whole.len()], points };
         line.fill(whole);
         line
     }
@@ -136,6 +187,9 @@ fn closest(a: &Polyline, b: &Polyline, squared: &mut f64) {
     }
 }
 
+/// A box around nothing.
+const EMPTY: BoundingBox = BoundingBox { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+
 /// The squared distance of two boxes.
 fn gap(a: &BoundingBox, b: &BoundingBox) -> f64 {
     let along = |k: usize| (a.min[k] - b.max[k]).max(b.min[k] - a.max[k]).max(0.0);
@@ -177,12 +231,47 @@ mod tests {
         let places: Vec<Vec<Vec3>> =
             network.curves().iter().map(|c| c.vertices().iter().map(|v| mesh.points()[v.index()]).collect()).collect();
         let mut least = f64::INFINITY;
-        for (i, j) in network.comparable_pairs() {
+        for (i, j) in comparable_pairs(&network) {
             for (p, q) in places[i].windows(2).flat_map(|p| places[j].windows(2).map(move |q| (p, q))) {
                 least = least.min(segment_distance([p[0], p[1]], [q[0], q[1]]).sqrt());
             }
         }
         assert!((least - expected).abs() < 1e-12);
+    }
+
+    /// All pairs of seams beside a chart that share no end.
+    fn comparable_pairs(network: &SeamNetwork) -> Vec<(usize, usize)> {
+        let mut pairs = Vec::new();
+        for chart in (0..network.loops.len()).map(ChartId::at) {
+            let seams = network.seams_beside(chart);
+            let all = seams.iter().enumerate().flat_map(|(k, i)| seams[k + 1..].iter().map(move |j| (*i, *j)));
+            pairs.extend(all.filter(|(i, j)| !network.share_an_end(*i, *j)));
+        }
+        pairs
+    }
+
+    /// Of hundreds of seams beside a chart, a few for each are looked at, and the closest pair is among them.
+    #[test]
+    fn near_pairs_of_many_seams_are_few_and_the_closest_is_among_them() {
+        let mut random = shapes::Random(5);
+        let place = |k: usize| [(k % 20) as f64, (k / 20) as f64, 0.0];
+        let mut line = |k: usize| {
+            let off: Vec<f64> = (0..6).map(|_| 0.3 * random.symmetric()).collect();
+            let [x, y, z] = place(k);
+            Polyline::new(vec![[x + off[0], y + off[1], z + off[2]], [x + off[3], y + off[4], z + off[5]]])
+        };
+        let lines: Vec<Polyline> = (0..400).map(&mut line).collect();
+        let (mut squared, mut looks) = (f64::INFINITY, 0);
+        Seams::new((0..400).collect(), &lines).each_near_pair(&mut squared, |i, j, squared| {
+            assert_ne!(i, j);
+            looks += 1;
+            closest(&lines[i], &lines[j], squared);
+        });
+        let mut least = f64::INFINITY;
+        for (i, a) in lines.iter().enumerate() {
+            lines[i + 1..].iter().for_each(|b| closest(a, b, &mut least));
+        }
+        assert!(squared == least && looks < 4 * 400, "{squared} {least} {looks}");
     }
 
     #[test]
