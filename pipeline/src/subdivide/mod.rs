@@ -176,8 +176,8 @@ impl LinearChart {
         &self.uv
     }
 
-    /// By how much the plane must grow for the chart to have its own size there: the [`uv_scale`](crate::measure::scale::uv_scale) of the map by which it is
-    /// handed over.
+    /// By how much the plane must grow for the chart to have its own size there: the
+    /// [`uv_scale`](crate::measure::scale::uv_scale) of the map by which it is handed over.
     pub fn uv_scale(&self) -> f64 {
         self.uv_scale
     }
