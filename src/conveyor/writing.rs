@@ -76,7 +76,7 @@ pub(super) fn write(finished: Finished, after: &After) {
             let (facts, done) = surface.collect();
             let in_flight = surface.in_flight.clone();
             let whole = surface.whole;
-            let assembled = done.and_then(|done| assembled(&in_flight, &facts, done, whole));
+            let assembled = assembled(&in_flight, &facts, done, whole);
             (in_flight, facts, assembled)
         }
     };
@@ -105,13 +105,15 @@ pub(super) fn write(finished: Finished, after: &After) {
 fn assembled(
     in_flight: &InFlight,
     facts: &Facts,
-    (mesh, charts): (SurfaceMesh, Vec<Vec<CertifiedChart>>),
+    done: Result<(SurfaceMesh, Vec<Vec<CertifiedChart>>), Abort>,
     whole: usize,
 ) -> Result<(Report, Files), Abort> {
     let settings = &in_flight.settings;
     let labels = facts.content.as_ref().map_or(&[][..], |content| &content.labels);
-    let atlas =
-        in_flight.compute(Stage::Write, |_| stages::gather(mesh, charts.into_iter().flatten().collect(), settings))?;
+    let atlas = in_flight.compute(Stage::Write, |_| {
+        let (mesh, charts) = done?;
+        stages::gather(mesh, charts.into_iter().flatten().collect(), settings)
+    })?;
     let encoding = |one| in_flight.compute(Stage::Write, |m| stages::encode(one, &atlas, labels, settings, m));
     let encoded: Result<Vec<Encoded>, Abort> = std::thread::scope(|scope| {
         let encoding = &encoding;

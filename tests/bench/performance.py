@@ -22,10 +22,6 @@ What the page holds from "## Reading" on is written by people, and kept.
 import argparse
 import json
 import math
-import os
-import resource
-import shutil
-import signal
 import statistics
 import subprocess
 import sys
@@ -33,8 +29,7 @@ import tempfile
 from pathlib import Path
 
 import families
-
-READING = "## Reading"
+from side_by_side import READING, beside_python, spend, surface, write_medit
 
 GMSH = """
 import gmsh, math, resource, sys
@@ -64,26 +59,15 @@ print(spent() - before)
 """
 
 
-def spend(command, limit, core):
-    """Runs a command on one core: CPU seconds, peak MB, exit code (none: it did not end), what it said."""
-    with tempfile.TemporaryFile() as said:
-        def begin():
-            os.sched_setaffinity(0, {core})
-            resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 5))
-        process = subprocess.Popen(command, stdout=said, stderr=subprocess.DEVNULL, preexec_fn=begin)
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = 0
-        said.seek(0)
-        text = said.read().decode(errors="replace").strip()
-    ended = not os.WIFSIGNALED(status) or os.WTERMSIG(status) not in (signal.SIGXCPU, signal.SIGKILL)
-    return dict(cpu=usage.ru_utime + usage.ru_stime, mb=usage.ru_maxrss / 1024,
-                code=os.waitstatus_to_exitcode(status) if ended else None, said=text)
+def pinned(command, options):
+    """Runs a command on one core: its cost, and what it said."""
+    return spend(["taskset", "-c", options.core, *command], options.limit)
 
 
 def planish(program, path, options):
     """One run of a build: its cost, and the bytes that it wrote."""
     with tempfile.TemporaryDirectory() as out:
-        found = spend([program, "run", "-q", "--out", out, str(path)], options.limit, options.core)
+        found, _ = pinned([program, "run", "-q", "--out", out, path], options)
         found["bytes"] = sum(f.stat().st_size for f in Path(out).glob("*/*") if f.is_file())
     return found
 
@@ -93,25 +77,22 @@ def peer(name, path, options):
     if name == "mmgs":
         return mmgs(path, options)
     script = {"gmsh": GMSH, "xatlas": XATLAS, "pyacvd": PYACVD}[name]
-    found = spend([sys.executable, "-c", script, str(path)], options.limit, options.core)
+    found, said = pinned([sys.executable, "-c", script, path], options)
     if found["code"] == 0:
-        found["cpu"] = float(found["said"].split()[-1])
+        found["cpu"] = float(said.split()[-1])
     return found
 
 
 def mmgs(path, options):
-    import meshio
-    program = shutil.which("mmgs_O3") or str(Path(sys.executable).parent / "mmgs_O3")
     with tempfile.TemporaryDirectory() as folder:
-        mesh = meshio.read(path)
-        meshio.write(f"{folder}/in.mesh", meshio.Mesh(mesh.points, {"triangle": mesh.cells_dict["triangle"]}))
-        command = [program, "-v", "0", f"{folder}/in.mesh", f"{folder}/out.mesh"]
-        return spend(command, options.limit, options.core)
+        source = Path(folder) / "in.mesh"
+        write_medit(source, *surface(path))
+        return pinned([beside_python("mmgs_O3"), "-v", "0", source, Path(folder) / "out.mesh"], options)[0]
 
 
 def is_there(name):
     if name == "mmgs":
-        return shutil.which("mmgs_O3") or (Path(sys.executable).parent / "mmgs_O3").exists()
+        return beside_python("mmgs_O3") is not None
     return subprocess.run([sys.executable, "-c", f"import {name}"], capture_output=True).returncode == 0
 
 
@@ -150,13 +131,13 @@ def page(rows, options):
     head += [f"{key} : {name}" for name, _ in options.builds if name != "new" for key in ("memory", "written")]
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
     for row in rows:
-        mb, written = median(row, "new", "mb"), median(row, "new", "bytes")
+        mb, written = median(row, "new", "peak_mb"), median(row, "new", "bytes")
         cells = [row["file"], f"{row['triangles']:,}", cell(median(row, "new", "cpu")), cell(mb, 0),
                  cell(mb and mb * 1024 / row["triangles"]), cell(written and written / 1e6, 1)]
         cells += [cell(ratio(row, name)) for name in others]
         for name, _ in options.builds:
             if name != "new":
-                cells += [cell(ratio(row, name, "mb")), cell(ratio(row, name, "bytes"))]
+                cells += [cell(ratio(row, name, "peak_mb")), cell(ratio(row, name, "bytes"))]
         lines.append("| " + " | ".join(cells) + " |")
     growth = ["", "## Growth", "", "| family | from | to | exponent of CPU | of memory |", "| --- | --- | --- | --- | --- |"]
     for family in options.families:
@@ -164,7 +145,7 @@ def page(rows, options):
         if len(of) > 1:
             first, last = of[0], of[-1]
             span = math.log(last["triangles"] / first["triangles"])
-            power = [math.log(median(last, "new", key) / median(first, "new", key)) / span for key in ("cpu", "mb")]
+            power = [math.log(median(last, "new", key) / median(first, "new", key)) / span for key in ("cpu", "peak_mb")]
             growth.append(f"| {family} | {first['triangles']:,} | {last['triangles']:,} | {power[0]:.2f} | {power[1]:.2f} |")
     title = ["# What planish costs", "",
              f"Written by `tests/bench/performance.py`: medians of {options.runs} runs on one core; ratios are medians of those within",

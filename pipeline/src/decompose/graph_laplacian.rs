@@ -14,8 +14,8 @@ type LowerRows = Csr<(u32, f64)>;
 /// The Laplacian of a weighted graph, put together from edges between unknowns, and between an unknown and a node of which
 /// the uv are given.
 pub(super) struct GraphLaplacian {
-    /// Unknowns from this one on were added to a graph whose order does not know them.
-    added: usize,
+    /// How many unknowns are in a good order; those behind them were added.
+    ordered: usize,
     diagonal: Vec<f64>,
     off_diagonal: Vec<(u32, u32, f64)>,
     rhs: Vec<[f64; 2]>,
@@ -26,7 +26,7 @@ impl GraphLaplacian {
     pub(super) fn new(ordered: usize, added: usize) -> Self {
         let unknowns = ordered + added;
         let (diagonal, rhs) = (vec![0.0; unknowns], vec![[0.0; 2]; unknowns]);
-        Self { added: ordered, diagonal, off_diagonal: Vec::new(), rhs }
+        Self { ordered, diagonal, off_diagonal: Vec::new(), rhs }
     }
 
     /// Adds an edge between two different unknowns.
@@ -50,16 +50,22 @@ impl GraphLaplacian {
     /// The uv of the unknowns for which the sum of all weights times squared lengths is least; none where the matrix is not
     /// positive definite in doubles.
     pub(super) fn solve(mut self) -> Option<Vec<[f64; 2]>> {
+        if self.ordered == self.diagonal.len() {
+            return self.solve_as_numbered();
+        }
         let places = self.places();
         self.renumber(&places);
+        let solution = self.solve_as_numbered()?;
+        Some(places.into_iter().map(|place| solution[place as usize]).collect())
+    }
+
+    /// Eliminates the unknowns in the order of their numbers.
+    fn solve_as_numbered(self) -> Option<Vec<[f64; 2]>> {
         let by_row = || self.off_diagonal.iter().map(|(i, j, value)| (*i, (*j, *value)));
         let rows = Csr::sorted(self.diagonal.len(), by_row);
         let mut factor = Factor::shaped(&rows);
-        if !factor.fill(&rows, &self.diagonal) {
-            return None;
-        }
-        let solution = factor.solve(self.rhs);
-        Some(places.into_iter().map(|place| solution[place as usize]).collect())
+        let is_definite = factor.fill(&rows, &self.diagonal);
+        is_definite.then(|| factor.solve(self.rhs))
     }
 
     /// Per unknown its place in the order of elimination: each that was added comes right after the last of those that it is joined
@@ -67,14 +73,14 @@ impl GraphLaplacian {
     fn places(&self) -> Vec<u32> {
         let count = self.diagonal.len();
         // Per added unknown, the last of its neighbours that were not.
-        let mut last = vec![0; count - self.added];
+        let mut last = vec![0; count - self.ordered];
         for (i, j, _) in &self.off_diagonal {
             let (i, j) = (*i as usize, *j);
-            if i >= self.added && (j as usize) < self.added {
-                last[i - self.added] = last[i - self.added].max(j);
+            if i >= self.ordered && (j as usize) < self.ordered {
+                last[i - self.ordered] = last[i - self.ordered].max(j);
             }
         }
-        let ordered = (0..self.added as u32).map(|i| (i, 0));
+        let ordered = (0..self.ordered as u32).map(|i| (i, 0));
         let added = last.into_iter().zip(1_u32..);
         let mut keyed: Vec<((u32, u32), u32)> = ordered.chain(added).zip(0..).collect();
         keyed.sort_unstable();
@@ -85,9 +91,6 @@ impl GraphLaplacian {
 
     /// Numbers the unknowns by their places.
     fn renumber(&mut self, places: &[u32]) {
-        if self.added == self.diagonal.len() {
-            return;
-        }
         let (mut diagonal, mut rhs) = (self.diagonal.clone(), self.rhs.clone());
         for (unknown, place) in places.iter().enumerate() {
             (diagonal[*place as usize], rhs[*place as usize]) = (self.diagonal[unknown], self.rhs[unknown]);
@@ -243,7 +246,7 @@ mod tests {
             laplacian
         };
         let entries = |laplacian: &GraphLaplacian| {
-            let mut copy = made(laplacian.diagonal.len() as u32 - laplacian.added as u32);
+            let mut copy = made((laplacian.diagonal.len() - laplacian.ordered) as u32);
             copy.renumber(&laplacian.places());
             let rows = Csr::sorted(copy.diagonal.len(), || copy.off_diagonal.iter().map(|(i, j, v)| (*i, (*j, *v))));
             let factor = Factor::shaped(&rows);

@@ -125,7 +125,8 @@ impl Merge<'_, '_> {
         if self.groups[a as usize] != self.groups[b as usize] || self.are_faces_apart((a, b)) {
             return None;
         }
-        let union = self.regions.union(a, b).filter(|u| self.is_allowed(u))?;
+        let union =
+            self.regions.union(a, b).filter(|u| self.limits.allow(&self.regions.shape(&u.region, &u.outline)))?;
         let ratio = self.ratios[a as usize].max(self.ratios[b as usize]);
         let versions = (version[a as usize], version[b as usize]);
         Some(Candidate { cost: self.cost((a, b), &union, ratio), pair: (a, b), versions, ratio: None })
@@ -141,12 +142,6 @@ impl Merge<'_, '_> {
         let ratio = self.predictions.area_ratio(self.regions.complex, self.graph, &cells, loops);
         let evaluated = Candidate { cost: self.cost((a, b), &union, ratio), ratio: Some(ratio), ..candidate };
         (ratio <= self.limits.area_ratio).then_some(evaluated)
-    }
-
-    /// Whether the union may be a chart, its distortion apart.
-    fn is_allowed(&self, union: &Union) -> bool {
-        let shape = self.regions.shape(&union.region, &union.outline);
-        self.limits.allow(&shape)
     }
 
     /// Whether two regions meet in a feature, and are faces. That costs no more than the smaller of them: a plate with n holes has n

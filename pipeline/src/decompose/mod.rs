@@ -153,10 +153,9 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, monitor: &dyn Monitor)
         graph: &graph,
         predictions: Predictions::default(),
         limits,
-        bound: settings.max_area_ratio,
         checkpoint: &dual.checkpoint,
     };
-    let selection = Selection { dual: &dual, cells: &cells, limits, bound: settings.max_area_ratio };
+    let selection = Selection { dual: &dual, cells: &cells, limits };
     let charts = selection.charts(&search.run()?)?;
     let charts = search.absorb(charts, min_outline(&dual))?;
     let labels: Vec<u32> = cells.labels.iter().map(|c| charts.labels[*c as usize]).collect();

@@ -180,7 +180,7 @@ impl Network<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decompose::BoundaryShape;
+    use crate::decompose;
     use crate::decompose::dual::Dual;
     use crate::decompose::merge::Limits;
     use crate::decompose::patches::compact_cells;
@@ -232,13 +232,7 @@ mod tests {
             let dual = Dual::new(&mesh, &NoMonitor);
             let cells = compact_cells(&dual, |_| charts, &dual.checkpoint).expect("nobody cancels");
             let largest = 11 * mesh.triangles().len() / charts / 10;
-            let limits = Limits {
-                area_ratio: 1e6,
-                largest_ratio: 1e6,
-                triangles: largest,
-                strict_disks: false,
-                boundary: BoundaryShape::Natural,
-            };
+            let limits = Limits::new(&decompose::Settings { max_triangles: largest, ..Default::default() });
             let mut network = Network::new(&dual, cells.labels, limits);
             let mut random = Random(7);
             let (mut laid, mut undone) = (0, 0);

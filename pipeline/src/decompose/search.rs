@@ -58,8 +58,6 @@ pub(super) struct Search<'a> {
     pub graph: &'a CellGraph,
     pub predictions: Predictions,
     pub limits: Limits,
-    /// The largest area ratio of a chart.
-    pub bound: f64,
     pub checkpoint: &'a Checkpoint<'a>,
 }
 
@@ -128,7 +126,7 @@ impl Search<'_> {
     pub(super) fn run(&mut self) -> Result<SearchResult, Interrupted> {
         let components = farthest_first(self.graph, |_| 1);
         let whole = Regions::new(self.complex, components.labels.clone(), components.len);
-        let whole = self.fine(whole, WHOLE * self.bound)?;
+        let whole = self.fine(whole, WHOLE * self.limits.largest_ratio)?;
         let mut strategies = vec![components.labels.clone()];
         // The first strategy, of one chart for each component, is open to those that can be left whole, and to them alone.
         let as_one = Ranked { score: Score { charts: 1, cost: 0.0 }, strategy: 0 };

@@ -21,8 +21,6 @@ pub(super) struct Selection<'a> {
     pub dual: &'a Dual<'a>,
     pub cells: &'a Cells,
     pub limits: Limits,
-    /// The largest area ratio.
-    pub bound: f64,
 }
 
 impl Selection<'_> {
@@ -76,6 +74,6 @@ impl Selection<'_> {
     /// How many charts one with this prediction becomes: the ratio of each part is the largest one.
     fn parts(&self, prediction: Option<Prediction>) -> usize {
         let ratio = prediction.map_or(1.0, |v| v.ratio);
-        (ratio.ln() / self.bound.ln()).ceil().clamp(1.0, MAX_PARTS) as usize
+        (ratio.ln() / self.limits.largest_ratio.ln()).ceil().clamp(1.0, MAX_PARTS) as usize
     }
 }

@@ -207,7 +207,7 @@ impl Bounds<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decompose::BoundaryShape;
+    use crate::decompose;
     use crate::decompose::merge::Limits;
     use crate::monitor::NoMonitor;
     use crate::repair::{Settings, repair};
@@ -242,13 +242,7 @@ mod tests {
     fn bounds_do_not_hide_the_shortest_ways() {
         let mesh = repair(&shapes::bent_disk(16, 0.3, 0.2), &Settings::default()).expect("a surface is left").mesh;
         let dual = Dual::new(&mesh, &NoMonitor);
-        let limits = Limits {
-            area_ratio: 1e6,
-            largest_ratio: 1e6,
-            triangles: usize::MAX,
-            strict_disks: false,
-            boundary: BoundaryShape::Natural,
-        };
+        let limits = Limits::new(&decompose::Settings::default());
         let network = Network::new(&dual, vec![0; mesh.triangles().len()], limits);
         let inner: Vec<usize> = (0..mesh.points().len()).filter(|v| !network.is_open(*v)).collect();
         let mut random = Random(3);
@@ -264,13 +258,7 @@ mod tests {
     fn a_star_finds_what_dijkstra_finds() {
         let mesh = repair(&shapes::bent_disk(16, 0.3, 0.2), &Settings::default()).expect("a surface is left").mesh;
         let dual = Dual::new(&mesh, &NoMonitor);
-        let limits = Limits {
-            area_ratio: 1e6,
-            largest_ratio: 1e6,
-            triangles: usize::MAX,
-            strict_disks: false,
-            boundary: BoundaryShape::Natural,
-        };
+        let limits = Limits::new(&decompose::Settings::default());
         let network = Network::new(&dual, vec![0; mesh.triangles().len()], limits);
         let band = vec![true; mesh.points().len()];
         let (mut all, mut one) = (Tree::new(&dual), Tree::new(&dual));

@@ -249,10 +249,9 @@ fn across_protrusions(dual: &Dual, log_scale: &[f64], limits: &Limits) -> Result
         if next > 1 && range.width() <= limits.largest_ratio.ln() {
             break;
         }
-        let Some(cut) = best_cut(dual, log_scale, &labels, &rest, range, limits)? else { break };
-        for f in cut {
-            labels[f] = next;
-        }
+        let rest = Rest { dual, log_scale, labels: &labels, faces: &rest };
+        let Some(cut) = rest.best_cut(next, range, limits)? else { break };
+        labels = cut;
     }
     Ok(labels.iter().any(|label| *label > 0).then_some(labels))
 }
@@ -282,59 +281,68 @@ impl Range {
     }
 }
 
-/// The triangles that the best legal cut along a level takes off the `rest`, which is what has label 0.
-fn best_cut(
-    dual: &Dual,
-    log_scale: &[f64],
-    labels: &[u32],
-    rest: &[usize],
-    range: Range,
-    limits: &Limits,
-) -> Result<Option<Vec<usize>>, Interrupted> {
-    let mut cuts = Vec::new();
-    for level in LEVELS {
-        let Some(cut) = below(dual, log_scale, labels, rest, range.at(level)) else { continue };
-        let cost = cut_length(dual, labels, &cut) * (1.0 + OFF_CENTRE * (level - 0.5).abs());
-        cuts.push((cost, cut));
-    }
-    // Of cuts that cost the same, the first one.
-    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (_, is_cut) in cuts {
-        let groups = labels.iter().zip(&is_cut).map(|(label, is_cut)| match label {
-            0 => u32::from(*is_cut),
-            _ => label + 1,
-        });
-        let groups = Cells { labels: groups.collect(), len: 2 + labels.iter().max().map_or(0, |most| *most as usize) };
-        let legal = legal(dual, &Complex::new(dual, &groups), limits)?;
-        if legal.iter().all(|l| *l) {
-            return Ok(Some(rest.iter().copied().filter(|f| is_cut[*f]).collect()));
+/// What is left of a chart: the triangles that have label 0.
+struct Rest<'a> {
+    dual: &'a Dual<'a>,
+    log_scale: &'a [f64],
+    labels: &'a [u32],
+    faces: &'a [usize],
+}
+
+impl Rest<'_> {
+    /// The labels with the best legal cut along a level, what it takes off labelled `next`.
+    fn best_cut(&self, next: u32, range: Range, limits: &Limits) -> Result<Option<Vec<u32>>, Interrupted> {
+        let Some(ends) = self.ends() else { return Ok(None) };
+        let mut cuts = Vec::new();
+        for level in LEVELS {
+            let Some(is_cut) = self.below(range.at(level), ends) else { continue };
+            cuts.push((self.cut_length(&is_cut) * (1.0 + OFF_CENTRE * (level - 0.5).abs()), is_cut));
         }
+        // Of cuts that cost the same, the first one.
+        cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, is_cut) in cuts {
+            let labels = self.labels.iter().zip(&is_cut).map(|(label, is_cut)| if *is_cut { next } else { *label });
+            let groups = Cells { labels: labels.collect(), len: next as usize + 1 };
+            let legal = legal(self.dual, &Complex::new(self.dual, &groups), limits)?;
+            if legal.iter().all(|l| *l) {
+                return Ok(Some(groups.labels));
+            }
+        }
+        Ok(None)
     }
-    Ok(None)
-}
 
-/// The length between what is cut off and the rest.
-fn cut_length(dual: &Dual, labels: &[u32], is_cut: &[bool]) -> f64 {
-    let faces = (0..labels.len()).filter(|f| is_cut[*f]).map(FaceId::at);
-    let sides = faces.flat_map(|face| (0..3).map(move |k| HalfEdgeId::side_of(face, k)));
-    let is_between = |h: &HalfEdgeId| {
-        dual.twin(*h).is_some_and(|twin| !is_cut[twin.face().index()] && labels[twin.face().index()] == 0)
-    };
-    sides.filter(is_between).map(|h| dual.length(h)).sum()
-}
-
-/// Of the `rest`, which is what has label 0, the connected region below `level` that holds the least scale, filled up so that what
-/// stays, which holds the largest, is connected, too; none where nothing is left.
-fn below(dual: &Dual, log_scale: &[f64], labels: &[u32], rest: &[usize], level: f64) -> Option<Vec<bool>> {
-    let least = rest.iter().copied().min_by(|a, b| log_scale[*a].total_cmp(&log_scale[*b]))?;
-    let largest = rest.iter().copied().max_by(|a, b| log_scale[*a].total_cmp(&log_scale[*b]).then(b.cmp(a)))?;
-    let tip = connected(dual, least, |f| labels[f] == 0 && log_scale[f] < level);
-    // What the tip cuts off from the largest scale belongs to it, too: both sides are connected.
-    let stays = connected(dual, largest, |f| labels[f] == 0 && !tip[f]);
-    if !tip[least] || tip[largest] {
-        return None;
+    fn is_left(&self, face: usize) -> bool {
+        self.labels[face] == 0
     }
-    Some((0..labels.len()).map(|f| labels[f] == 0 && !stays[f]).collect())
+
+    /// Where the scale is least and largest.
+    fn ends(&self) -> Option<[usize; 2]> {
+        let by_scale = |a: &usize, b: &usize| self.log_scale[*a].total_cmp(&self.log_scale[*b]);
+        let least = self.faces.iter().copied().min_by(by_scale)?;
+        let largest = self.faces.iter().copied().max_by(|a, b| by_scale(a, b).then(b.cmp(a)))?;
+        Some([least, largest])
+    }
+
+    /// The connected region below `level` that holds the least scale, filled up so that what stays, which holds the largest, is
+    /// connected, too; none where nothing is left.
+    fn below(&self, level: f64, [least, largest]: [usize; 2]) -> Option<Vec<bool>> {
+        let tip = connected(self.dual, least, |f| self.is_left(f) && self.log_scale[f] < level);
+        if !tip[least] || tip[largest] {
+            return None;
+        }
+        // What the tip cuts off from the largest scale belongs to it, too: both sides are connected.
+        let stays = connected(self.dual, largest, |f| self.is_left(f) && !tip[f]);
+        Some((0..self.labels.len()).map(|f| self.is_left(f) && !stays[f]).collect())
+    }
+
+    /// The length between what is cut off and what stays.
+    fn cut_length(&self, is_cut: &[bool]) -> f64 {
+        let cut = self.faces.iter().filter(|f| is_cut[**f]);
+        let sides = cut.flat_map(|f| FaceId::at(*f).sides());
+        let stays = |f: usize| self.is_left(f) && !is_cut[f];
+        let is_between = |h: &HalfEdgeId| self.dual.twin(*h).is_some_and(|twin| stays(twin.face().index()));
+        sides.filter(is_between).map(|h| self.dual.length(h)).sum()
+    }
 }
 
 /// The triangles that are connected to `seed` through those that `admit` tells.
@@ -344,8 +352,7 @@ fn connected(dual: &Dual, seed: usize, admit: impl Fn(usize) -> bool) -> Vec<boo
     let mut front: Vec<FaceId> = if is_connected[seed] { vec![FaceId::at(seed)] } else { vec![] };
     // Each triangle enters once.
     while let Some(face) = front.pop() {
-        for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
-            let Some(other) = dual.twin(h).map(HalfEdgeId::face) else { continue };
+        for other in face.sides().into_iter().filter_map(|h| dual.twin(h).map(HalfEdgeId::face)) {
             if !is_connected[other.index()] && admit(other.index()) {
                 is_connected[other.index()] = true;
                 front.push(other);

@@ -93,7 +93,7 @@ pub(crate) fn iterated_harmonic_map(
     let fine = Dofs::new(nodes.count(), (0..nodes.count() as u32).filter(|n| !is_outer[*n as usize]).collect());
     // In the order in which they are eliminated.
     let vertices = chart.elimination().iter().map(|v| nodes.at_vertex(*v) as u32);
-    let coarse = Dofs::new(nodes.count(), vertices.filter(|n| !is_outer[*n as usize]).collect());
+    let coarse = Dofs::new(nodes.count(), vertices.collect());
     let faces = 0..chart.triangles().len();
     let corners = |f: usize| {
         let [a, b, c, ..] = nodes.of(f);

@@ -46,80 +46,67 @@ impl SeamNetwork {
     }
 }
 
-/// The seams beside a chart, halved along the axis in which they spread most, and so on, with boxes around all halves.
+/// The seams beside a chart, in an order in which halves lie on either side of the axis along which all of them spread most, and so
+/// on in the halves.
 struct Seams {
     /// Their positions among the curves.
     order: Vec<usize>,
-    boxes: Vec<BoundingBox>,
+    halves: Halves,
 }
 
 impl Seams {
-    fn new(order: Vec<usize>, polylines: &[Polyline]) -> Self {
-        let mut seams = Self { boxes: vec![EMPTY; 4 * order.len()], order };
-        if !seams.order.is_empty() {
-            seams.fill(seams.whole(), polylines);
-        }
-        seams
-    }
-
-    fn whole(&self) -> Range {
-        Range { first: 0, end: self.order.len(), at: 0 }
-    }
-
-    /// As deep as the logarithm of the number of seams.
-    fn fill(&mut self, range: Range, polylines: &[Polyline]) -> BoundingBox {
-        let of = |i: &usize| polylines[*i].boxes[0];
-        let seams = &mut self.order[range.first..range.end];
-        let around = BoundingBox::of(seams.iter().flat_map(|i| [of(i).min, of(i).max])).unwrap_or(EMPTY);
-        self.boxes[range.at] = around;
-        if range.len() > 1 {
-            let width = |k: usize| around.max[k] - around.min[k];
-            let axis = (1..3).fold(0, |best, k| if width(k) > width(best) { k } else { best });
-            let centre = |i: &usize| of(i).min[axis] + of(i).max[axis];
-            seams.sort_unstable_by(|a, b| centre(a).total_cmp(&centre(b)).then(a.cmp(b)));
-            for half in range.halves() {
-                self.fill(half, polylines);
-            }
-        }
-        around
+    fn new(mut order: Vec<usize>, polylines: &[Polyline]) -> Self {
+        halve_along_widest(&mut order, polylines);
+        let halves = Halves::new(order.len(), |k| polylines[order[k]].halves.boxes[0]);
+        Self { order, halves }
     }
 
     /// Visits pairs of seams whose boxes are closer than `squared`, which the visits lower; the nearer ones first.
     fn each_near_pair(&self, squared: &mut f64, mut visit: impl FnMut(usize, usize, &mut f64)) {
-        let mut open = if self.order.is_empty() { vec![] } else { vec![(self.whole(), self.whole())] };
-        let distance = |(r, s): &(Range, Range)| gap(&self.boxes[r.at], &self.boxes[s.at]);
-        // It ends: of every pair one range is halved.
-        while let Some((r, s)) = open.pop() {
-            if distance(&(r, s)) >= *squared {
-                continue;
-            }
-            match (r.len(), s.len()) {
-                (1, 1) if r.at == s.at => {}
-                (1, 1) => visit(self.order[r.first], self.order[s.first], squared),
-                _ if r.at == s.at => {
-                    let [a, b] = r.halves();
-                    open.extend([(a, b), (a, a), (b, b)]);
-                }
-                (n, m) => {
-                    let mut next = if n >= m { r.halves().map(|h| (h, s)) } else { s.halves().map(|h| (r, h)) };
-                    if distance(&next[0]) < distance(&next[1]) {
-                        next.swap(0, 1);
-                    }
-                    open.extend(next);
-                }
-            }
-        }
+        each_near_pair(&self.halves, &self.halves, squared, |k, l, squared| {
+            visit(self.order[k], self.order[l], squared)
+        });
     }
 }
 
-/// A polyline with boxes around it, its halves, their halves and so on.
+/// As deep as the logarithm of the number of seams.
+fn halve_along_widest(order: &mut [usize], polylines: &[Polyline]) {
+    if order.len() < 2 {
+        return;
+    }
+    let of = |i: &usize| polylines[*i].halves.boxes[0];
+    let around = BoundingBox::of(order.iter().flat_map(|i| [of(i).min, of(i).max])).unwrap_or(EMPTY);
+    let width = |k: usize| around.max[k] - around.min[k];
+    let axis = (1..3).fold(0, |best, k| if width(k) > width(best) { k } else { best });
+    let centre = |i: &usize| of(i).min[axis] + of(i).max[axis];
+    order.sort_unstable_by(|a, b| centre(a).total_cmp(&centre(b)).then(a.cmp(b)));
+    let (first, second) = order.split_at_mut(order.len() / 2);
+    halve_along_widest(first, polylines);
+    halve_along_widest(second, polylines);
+}
+
+/// A polyline with boxes around its segments.
 struct Polyline {
     points: Vec<Vec3>,
-    /// The box of the segments `first..end`, by the position that [`Range`] gives it.
+    halves: Halves,
+}
+
+impl Polyline {
+    fn new(points: Vec<Vec3>) -> Self {
+        let of_segment = |k: usize| BoundingBox::of([points[k], points[k + 1]]).unwrap_or(EMPTY);
+        let halves = Halves::new(points.len() - 1, of_segment);
+        Self { points, halves }
+    }
+}
+
+/// Boxes around things in a row, their halves, the halves of these and so on.
+struct Halves {
+    count: usize,
+    /// The box around `first..end`, by the position that [`Range`] gives it.
     boxes: Vec<BoundingBox>,
 }
 
-/// Segments of a polyline, and the position of their box: that of the halves of box `i` is `2 i + 1` and `2 i + 2`.
+/// Things in a row, and the position of their box: that of the halves of box `i` is `2 i + 1` and `2 i + 2`.
 #[derive(Clone, Copy)]
 struct Range {
     first: usize,
@@ -138,53 +125,69 @@ impl Range {
     }
 }
 
-impl Polyline {
-    fn new(points: Vec<Vec3>) -> Self {
-        let whole = Range { first: 0, end: points.len() - 1, at: 0 };
-        // Halves of n segments are numbered below 4 n.
-        let mut line = Self { boxes: vec![EMPTY; 4 * whole.len()], points };
-        line.fill(whole);
-        line
+impl Halves {
+    /// Those of so many things, around each of which is a box.
+    fn new(count: usize, of: impl Fn(usize) -> BoundingBox) -> Self {
+        // Halves of n things are numbered below 4 n.
+        let mut halves = Self { count, boxes: vec![EMPTY; 4 * count] };
+        if count > 0 {
+            halves.fill(halves.whole(), &of);
+        }
+        halves
     }
 
     fn whole(&self) -> Range {
-        Range { first: 0, end: self.points.len() - 1, at: 0 }
+        Range { first: 0, end: self.count, at: 0 }
     }
 
-    /// As deep as the logarithm of the number of segments.
-    fn fill(&mut self, range: Range) -> BoundingBox {
-        let found = if range.len() > 1 {
-            let [a, b] = range.halves().map(|half| self.fill(half));
-            BoundingBox::of([a.min, a.max, b.min, b.max])
+    /// As deep as the logarithm of their number.
+    fn fill(&mut self, range: Range, of: &impl Fn(usize) -> BoundingBox) -> BoundingBox {
+        self.boxes[range.at] = if range.len() > 1 {
+            let [a, b] = range.halves().map(|half| self.fill(half, of));
+            BoundingBox::of([a.min, a.max, b.min, b.max]).unwrap_or(EMPTY)
         } else {
-            BoundingBox::of(self.points[range.first..=range.end].iter().copied())
+            of(range.first)
         };
-        self.boxes[range.at] = found.unwrap_or(self.boxes[range.at]);
         self.boxes[range.at]
     }
 }
 
-/// Lowers `squared` to the squared distance of two polylines, if that is less. Every step halves one of two ranges,
-/// so the stack is never longer than the number of halvings.
-fn closest(a: &Polyline, b: &Polyline, squared: &mut f64) {
-    let mut open = vec![(a.whole(), b.whole())];
+/// Visits pairs, of one thing each, whose boxes are closer than `squared`, which the visits lower; the nearer ones first. Of a
+/// set with itself, each pair of different things once. Every step halves one of two ranges, or both, so the stack is never
+/// longer than twice the number of halvings.
+fn each_near_pair(a: &Halves, b: &Halves, squared: &mut f64, mut visit: impl FnMut(usize, usize, &mut f64)) {
+    let is_same = |r: Range, s: Range| std::ptr::eq(a, b) && r.at == s.at;
+    let distance = |(r, s): &(Range, Range)| gap(&a.boxes[r.at], &b.boxes[s.at]);
+    let mut open = if a.count > 0 && b.count > 0 { vec![(a.whole(), b.whole())] } else { vec![] };
     while let Some((r, s)) = open.pop() {
-        if gap(&a.boxes[r.at], &b.boxes[s.at]) >= *squared {
+        if distance(&(r, s)) >= *squared {
             continue;
         }
-        if r.len() == 1 && s.len() == 1 {
-            let (p, q) = (&a.points[r.first..], &b.points[s.first..]);
-            *squared = squared.min(segment_distance([p[0], p[1]], [q[0], q[1]]));
-            continue;
+        match (r.len(), s.len()) {
+            (1, 1) if is_same(r, s) => {}
+            (1, 1) => visit(r.first, s.first, squared),
+            _ if is_same(r, s) => {
+                let [first, second] = r.halves();
+                open.extend([(first, second), (first, first), (second, second)]);
+            }
+            (n, m) => {
+                let mut next = if n >= m { r.halves().map(|h| (h, s)) } else { s.halves().map(|h| (r, h)) };
+                // The nearer half is looked at first.
+                if distance(&next[0]) < distance(&next[1]) {
+                    next.swap(0, 1);
+                }
+                open.extend(next);
+            }
         }
-        let mut next = if r.len() >= s.len() { r.halves().map(|h| (h, s)) } else { s.halves().map(|h| (r, h)) };
-        // The nearer half is looked at first.
-        let distance = |(r, s): &(Range, Range)| gap(&a.boxes[r.at], &b.boxes[s.at]);
-        if distance(&next[0]) < distance(&next[1]) {
-            next.swap(0, 1);
-        }
-        open.extend(next);
     }
+}
+
+/// Lowers `squared` to the squared distance of two polylines, if that is less.
+fn closest(a: &Polyline, b: &Polyline, squared: &mut f64) {
+    each_near_pair(&a.halves, &b.halves, squared, |i, j, squared| {
+        let (p, q) = (&a.points[i..], &b.points[j..]);
+        *squared = squared.min(segment_distance([p[0], p[1]], [q[0], q[1]]));
+    });
 }
 
 /// A box around nothing.

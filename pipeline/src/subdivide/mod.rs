@@ -191,12 +191,6 @@ impl LinearChart {
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
-
-    #[cfg(test)]
-    fn turns_left(&self, t: [u32; 3]) -> bool {
-        let [a, b, c] = t.map(|n| self.uv[n as usize]);
-        crate::grid::orientation(a, b, c) > 0
-    }
 }
 
 /// Turns the maps of an atlas into linear triangulations. Charts with a map in `straight` are handed over by that one, if it

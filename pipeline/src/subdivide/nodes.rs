@@ -70,7 +70,12 @@ impl Nodes {
 
     /// The node in the middle of the edge along a half-edge of the surface.
     pub(super) fn at_middle(&self, mesh: &SurfaceMesh, h: HalfEdgeId) -> u32 {
-        self.vertex.len() as u32 + self.edge[mesh.edges().edge(h).index()]
+        self.middle_of(self.edge[mesh.edges().edge(h).index()])
+    }
+
+    /// The node in the middle of an edge, which is told by its first copy.
+    fn middle_of(&self, edge: u32) -> u32 {
+        self.vertex.len() as u32 + edge
     }
 
     /// The nodes of a chart: its vertices, then the middles of its edges.
@@ -89,7 +94,7 @@ impl Nodes {
     /// The node in the middle of an edge of the surface, where that is one of the triangulations.
     pub(super) fn split_at(&self, mesh: &SurfaceMesh, h: HalfEdgeId) -> Option<u32> {
         let edge = self.edge[mesh.edges().edge(h).index()];
-        self.is_split[edge as usize].then_some(self.vertex.len() as u32 + edge)
+        self.is_split[edge as usize].then_some(self.middle_of(edge))
     }
 
     /// How many edges and parts of edges were halved.
@@ -107,7 +112,7 @@ impl Nodes {
     pub(super) fn is_cut(&self, curve: &Curve) -> bool {
         let edges = &self.curve_edges[curve.id().index()];
         curve.vertices().windows(2).zip(edges).any(|(ends, edge)| {
-            let middle = self.vertex.len() as u32 + edge;
+            let middle = self.middle_of(*edge);
             ends.iter().any(|v| self.middle(self.at_vertex(*v), middle).is_some())
         })
     }
@@ -153,7 +158,7 @@ impl Nodes {
         for (w, edge) in curve.vertices().windows(2).zip(&self.curve_edges[curve.id().index()]) {
             let [a, b] = [w[0], w[1]].map(|v| self.at_vertex(v));
             if self.is_split[*edge as usize] {
-                let middle = self.vertex.len() as u32 + edge;
+                let middle = self.middle_of(*edge);
                 self.push_inside(a, middle, &mut nodes);
                 nodes.push(middle);
                 self.push_inside(middle, b, &mut nodes);

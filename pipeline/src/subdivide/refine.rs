@@ -52,12 +52,11 @@ type Part = [Corner; 3];
 
 /// How far a middle of a side may be from the middle of its chord, relative to the least height of the straight triangle, for
 /// the triangle to stay whole. The differential of the straight map then differs from that of the curved one by at most 8 times
-/// as much in any direction: most at a corner, of the two sides there. By experience: at 1/64, atlas.msh
-/// of the six anchors with 100,000 triangles has a third of the triangles, and no mesh is worse for it.
+/// as much in any direction: most at a corner, of the two sides there. By experience: surfaces of 100,000
+/// triangles come to 1.0 to 1.7 for each, and of 42 meshes of Gmsh none is worse for it.
 const BEND: f64 = 1.0 / 32.0;
 
-/// Charts of fewer triangles are split into four everywhere: it costs next to nothing, and what Gmsh makes of coarse triangles depends
-/// on where their sides are halved (a flat square of 200: edges a sixth too short at its coarse end).
+/// Charts of fewer triangles are split into four everywhere: that costs next to nothing.
 pub(super) const FEW: usize = 500;
 
 /// Triangulates all charts by straight triangles that turn left; in those that are `fine` no triangle stays whole. Returns
@@ -283,30 +282,28 @@ impl<'a> Refiner<'a> {
     }
 
     /// A chart in its straight triangles, and how many of its curved ones came apart into more than four.
-    fn built(&self, chart: usize) -> (LinearChart, usize) {
-        let (charts, map) = (self.charts[chart].chart(), self.maps[chart]);
-        let (on_surface, vertices) = (&self.on_surface[chart], charts.vertices().len());
+    fn built(&self, number: usize) -> (LinearChart, usize) {
+        let (chart, map) = (self.charts[number].chart(), self.maps[number]);
+        let (on_surface, vertices) = (&self.on_surface[number], chart.vertices().len());
         let mut built = LinearChart {
             nodes: on_surface[..vertices].to_vec(),
             uv: map.nodes[..vertices].to_vec(),
             triangles: Vec::with_capacity(map.cells.len()),
             faces: Vec::with_capacity(map.cells.len()),
-            uv_scale: uv_scale(charts, map),
+            uv_scale: uv_scale(chart, map),
         };
         // Where middles of edges stand in the triangulation, and nodes between these.
         let mut middles = vec![u32::MAX; map.nodes.len()];
         let mut between: BTreeMap<u32, u32> = BTreeMap::new();
         let (mut leaves, mut refined) = (Vec::new(), 0);
-        for (face, cell, f) in charts.faces().iter().zip(&map.cells).zip(0..).map(|((face, cell), f)| (face.0, cell, f))
-        {
-            let whole = self.whole(face);
+        for (f, (FaceId(face), cell)) in (0..).zip(chart.faces().iter().zip(&map.cells)) {
             leaves.clear();
-            self.leaves(face, &whole, &mut leaves);
+            self.leaves(*face, &self.whole(*face), &mut leaves);
             refined += usize::from(leaves.len() > 4);
             for part in &leaves {
                 let mut add = |corner: &Corner| {
                     built.nodes.push(corner.node);
-                    built.uv.push(self.uv_at(face, corner.at));
+                    built.uv.push(self.uv_at(*face, corner.at));
                     built.nodes.len() as u32 - 1
                 };
                 let triangle = part.map(|corner| match node_at(corner.at) {

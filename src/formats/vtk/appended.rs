@@ -148,8 +148,8 @@ fn packed(bytes: &[u8]) -> Vec<u8> {
     for block in blocks {
         let at = packed.len();
         packed.resize(at + compressor.zlib_compress_bound(block.len()), 0);
-        // Within the bound there is room for any block.
-        let size = compressor.zlib_compress(block, &mut packed[at..]).unwrap_or_default();
+        let size =
+            compressor.zlib_compress(block, &mut packed[at..]).expect("within the bound there is room for any block");
         packed.truncate(at + size);
         numbers.push(size);
     }
@@ -167,7 +167,7 @@ mod tests {
     fn a_field_is_of_floats_where_these_hold_it() {
         let kind = |values: &[f64]| Array::field("f", values.iter().copied()).kind;
         assert_eq!(kind(&[]), "Float32");
-        assert_eq!(kind(&[0.0, 1.0, -3.5e38_f64.min(3.4e38), 1e-37]), "Float32");
+        assert_eq!(kind(&[0.0, 1.0, -3.4e38, 1e-37]), "Float32");
         for beyond in [1e-39, 1e39, f64::MIN_POSITIVE] {
             assert_eq!(kind(&[1.0, beyond]), "Float64", "{beyond}");
         }

@@ -135,12 +135,7 @@ impl<'a> Stream<'a> {
         let word: u64 = if packing.wide { 8 } else { 4 };
         let size = count.saturating_mul(word);
         let bytes = self.take(size)?;
-        // The highest byte first: each shifts those before it.
-        let number = |word: &[u8]| match packing.order {
-            Order::Big => word.iter().fold(0, |number, byte| number << 8 | u64::from(*byte)),
-            Order::Little => word.iter().rfold(0, |number, byte| number << 8 | u64::from(*byte)),
-        };
-        Ok(bytes.chunks_exact(word as usize).map(number).collect())
+        Ok(bytes.chunks_exact(word as usize).map(|word| packing.order.whole(word)).collect())
     }
 }
 

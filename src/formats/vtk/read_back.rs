@@ -2,7 +2,7 @@
 //! they are read as an input is, and nothing is taken for granted.
 
 use super::cell;
-use super::scalar::Scalar;
+use super::scalar::{Order, Scalar};
 use super::vtu::{Grid, Shape, VtuError};
 use super::xml::Arrays;
 use super::xml_outline::outline;
@@ -166,9 +166,9 @@ impl Columns<'_, '_> {
     }
 }
 
-/// A whole number of up to 64 bits, the lowest byte first; as unsigned.
+/// A whole number, as unsigned.
 fn whole(bytes: &[u8]) -> u64 {
-    bytes.iter().rfold(0, |number, byte| number << 8 | u64::from(*byte))
+    Order::Little.whole(bytes)
 }
 
 /// A float or a double.

@@ -10,6 +10,17 @@ pub(super) enum Order {
     Little,
 }
 
+impl Order {
+    /// The whole number of up to 64 bits that these bytes are, as unsigned.
+    pub(super) fn whole(self, bytes: &[u8]) -> u64 {
+        // The highest byte first: each shifts those before it.
+        match self {
+            Self::Big => bytes.iter().fold(0, |number, byte| number << 8 | u64::from(*byte)),
+            Self::Little => bytes.iter().rfold(0, |number, byte| number << 8 | u64::from(*byte)),
+        }
+    }
+}
+
 /// Collects what `$each` makes of the numbers of a type, taken `$group` at a time.
 macro_rules! collected {
     ($type:ty, $group:literal, $bytes:expr, $order:expr, $each:expr) => {{

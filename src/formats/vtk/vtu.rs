@@ -153,32 +153,43 @@ fn point_fields(charts: &[&CertifiedChart]) -> Vec<Array> {
 /// The fields of every triangle.
 fn cell_fields(atlas: &CertifiedAtlas, charts: &[&CertifiedChart], labels: &[Label]) -> Vec<Array> {
     let colours = atlas.seams().colours();
-    // What all triangles of a chart have.
-    let of_chart = |name: &str, value: &dyn Fn(&CertifiedChart) -> i32| {
-        Array::integers(name, charts.iter().flat_map(|c| repeat_n(value(c), c.fields().len())))
-    };
-    let triangle = charts.iter().flat_map(|certified| {
-        let cells = 0..certified.fields().len();
-        cells.map(|f| certified.chart().source_triangle(f) as i32)
-    });
+    let all = || charts.iter().copied();
     let untangled: Vec<u8> = charts.iter().flat_map(|c| c.untangled().map(u8::from)).collect();
     let fields = || charts.iter().flat_map(|certified| certified.fields());
     let field = |name: &str, get: fn(&CellFields) -> f64| Array::field(name, fields().map(get));
     let mut arrays = vec![
-        of_chart("chart", &|c| c.id().0 as i32),
-        Array::integers("triangle", triangle),
+        of_charts("chart", all(), |c| c.id().0 as i32),
+        source_triangles(all()),
         field("det_min", |f| f.det_min),
         field("det_max", |f| f.det_max),
         field("jacobian_ratio", |f| f.jacobian_ratio),
         field("conformal_distortion", |f| f.conformal_distortion),
         field("area_scale", |f| f.area_scale),
         Array::bytes("untangled", &untangled),
-        of_chart("colour", &|c| colours[c.id().index()] as i32),
+        of_charts("colour", all(), |c| colours[c.id().index()] as i32),
     ];
     if !labels.is_empty() {
-        arrays.push(of_chart("label", &|c| tag_of(atlas, c.id(), labels)));
+        arrays.push(of_charts("label", all(), |c| tag_of(atlas, c.id(), labels)));
     }
     arrays
+}
+
+/// What all triangles of a chart have, for each triangle.
+pub(super) fn of_charts<'a>(
+    name: &str,
+    charts: impl Iterator<Item = &'a CertifiedChart>,
+    value: impl Fn(&CertifiedChart) -> i32,
+) -> Array {
+    Array::integers(name, charts.flat_map(|c| repeat_n(value(c), c.chart().triangles().len())))
+}
+
+/// The triangle of the input that each triangle is part of.
+pub(super) fn source_triangles<'a>(charts: impl Iterator<Item = &'a CertifiedChart>) -> Array {
+    let of_chart = |certified: &'a CertifiedChart| {
+        let chart = certified.chart();
+        (0..chart.triangles().len()).map(|f| chart.source_triangle(f) as i32)
+    };
+    Array::integers("triangle", charts.flat_map(of_chart))
 }
 
 /// The tag of the label of a chart; -1 where there are no labels.

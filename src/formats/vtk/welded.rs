@@ -5,15 +5,14 @@
 //! manifold included.
 
 use super::appended::{Array, Grid};
-use super::vtu::{names_of_labels, tag_of};
+use super::vtu::{names_of_labels, of_charts, source_triangles, tag_of};
 use crate::formats::joined::JoinedVertices;
 use crate::formats::labels::Label;
+use planish_core::CertifiedAtlas;
 use planish_core::atlas::Chart;
 use planish_core::mesh::SurfaceMesh;
 use planish_core::vec3::{Vec3, midpoint};
-use planish_core::{CertifiedAtlas, CertifiedChart};
 use std::collections::HashMap;
-use std::iter::repeat_n;
 
 /// The bytes of `welded.vtu`: a triangle of six nodes for each of surface.vtu, in the same order.
 ///
@@ -75,17 +74,10 @@ impl Nodes {
 }
 
 fn cell_fields(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<Array> {
-    let of_chart = |name: &str, value: &dyn Fn(&CertifiedChart) -> i32| {
-        let of_triangles = |c| repeat_n(value(c), c.chart().triangles().len());
-        Array::integers(name, atlas.charts().iter().flat_map(of_triangles))
-    };
-    let triangle = atlas.charts().iter().flat_map(|certified| {
-        let faces = 0..certified.chart().triangles().len();
-        faces.map(|face| certified.chart().source_triangle(face) as i32)
-    });
-    let mut fields = vec![of_chart("chart", &|c| c.id().0 as i32), Array::integers("triangle", triangle)];
+    let charts = || atlas.charts().iter();
+    let mut fields = vec![of_charts("chart", charts(), |c| c.id().0 as i32), source_triangles(charts())];
     if !labels.is_empty() {
-        fields.push(of_chart("label", &|c| tag_of(atlas, c.id(), labels)));
+        fields.push(of_charts("label", charts(), |c| tag_of(atlas, c.id(), labels)));
     }
     fields
 }
@@ -95,9 +87,16 @@ mod tests {
     use super::*;
     use crate::formats::texture::tests::{atlas_of, labelled_cube};
     use crate::formats::vtu::{Shape, read_shape};
-    use crate::formats::{Format, LabelSource, Limits, Source, read_alone};
+    use crate::formats::{Content, Format, LabelSource, Limits, ReadError, Source, read_alone};
     use planish_core::shapes;
     use std::collections::BTreeMap;
+
+    /// Reads a file with its array `label`, which must be there.
+    fn read_labelled(bytes: &[u8]) -> Result<Content, ReadError> {
+        let limits = Limits::default();
+        let source = Source { labels: &LabelSource::Array("label".to_owned()), ..Source::alone(bytes, &limits) };
+        crate::formats::read(Format::Vtu, &source)
+    }
 
     /// How many triangles each edge has, with its middle.
     fn sides(cells: &[[u32; 6]]) -> BTreeMap<([u32; 2], u32), usize> {
@@ -118,7 +117,7 @@ mod tests {
         let bytes = surface(&atlas, &[]);
         let Shape { points, cells, .. } = read_shape(&bytes).expect("read");
         let sides = sides(&cells);
-        assert!(atlas.charts().len() > 1);
+        assert!(atlas.charts().len() > 1 && read_labelled(&bytes).is_err(), "there are no labels");
         assert!(sides.values().all(|triangles| *triangles == 2), "closed");
         assert_eq!(points.len(), atlas.mesh().points().len() + sides.len());
         for ([a, b], middle) in sides.keys() {
@@ -148,10 +147,9 @@ mod tests {
         let bytes = surface(&atlas, &labels);
         let cells = read_shape(&bytes).expect("read").cells;
         assert!(sides(&cells).values().all(|triangles| *triangles == 2));
-        let limits = Limits::default();
-        let source = Source { labels: &LabelSource::Array("label".to_owned()), ..Source::alone(&bytes, &limits) };
-        let labels = crate::formats::read(Format::Vtu, &source).expect("read").notes.labels;
-        let tags: Vec<i32> = labels.iter().map(|l| l.tag).collect();
+        let content = read_labelled(&bytes).expect("a field");
+        assert_eq!(content.soup.labels().len(), cells.len());
+        let tags: Vec<i32> = content.notes.labels.iter().map(|l| l.tag).collect();
         assert_eq!(tags, [10, 11, 12, 13, 14, 15]);
     }
 }
