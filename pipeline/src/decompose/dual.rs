@@ -105,6 +105,11 @@ impl<'a> Dual<'a> {
         self.coincident_faces.get(&h).map_or(&[], Vec::as_slice)
     }
 
+    /// All half-edges with such triangles.
+    pub(super) fn coincidences(&self) -> impl Iterator<Item = (HalfEdgeId, &[FaceId])> {
+        self.coincident_faces.iter().map(|(h, faces)| (*h, faces.as_slice()))
+    }
+
     fn step(&self, h: HalfEdgeId) -> f64 {
         let m = self.middle(h);
         let reach = |f: FaceId| distance(self.centroids[f.index()], m);

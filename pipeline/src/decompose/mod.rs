@@ -19,9 +19,11 @@
 //! sorting, but for a fixed number of cells; every loop has its reason to end beside it.
 
 mod assemble;
+mod boundaries;
 mod boundary_shape;
 mod clearance;
 mod complex;
+mod contacts;
 mod dual;
 mod ears;
 mod evaluate;
@@ -51,6 +53,8 @@ pub use assemble::assemble;
 pub(crate) use assemble::with_outer;
 pub use boundary_shape::BoundaryShape;
 use complex::Complex;
+pub(crate) use contacts::touches_itself;
+use contacts::without_contacts;
 use dual::Dual;
 pub use ears::{WithoutEars, split_ears};
 use features::{min_outline, with_features};
@@ -63,7 +67,7 @@ use search::Search;
 use selection::Selection;
 use split::legal;
 pub(crate) use split::part_of;
-pub use split::{contact, halve, separate, split};
+pub use split::{halve, separate, split};
 use voronoi::{Cells, bisect_until};
 
 /// Why a surface has no atlas. Every surface has one.
@@ -159,6 +163,7 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, monitor: &dyn Monitor)
     let charts = selection.charts(&search.run()?)?;
     let charts = search.absorb(charts, min_outline(&dual))?;
     let labels: Vec<u32> = cells.labels.iter().map(|c| charts.labels[*c as usize]).collect();
+    let labels = without_contacts(&dual, Cells { labels, len: charts.len }, &limits)?.labels;
     let size = |h: HalfEdgeId| graph.area(cells.labels[h.face().index()]).sqrt();
     let atlas = finish(&dual, labels, limits, settings, &cells, size)?;
     dual.checkpoint.end()?;

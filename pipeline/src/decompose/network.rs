@@ -2,6 +2,7 @@
 //!
 //! Seams are moved by one operation: see [`super::reroute`].
 
+use super::boundaries::Boundaries;
 use super::dual::Dual;
 use super::merge::Limits;
 use crate::topology::partition::Partition;
@@ -24,10 +25,11 @@ pub(super) struct Network<'a> {
     /// Per label the area that it keeps at least, and the one that it has.
     pub min_areas: Vec<f64>,
     pub areas: Vec<f64>,
-    /// Per label, its triangles, the vertices inside it, and the half-edges around it.
+    /// Per label, its triangles, the vertices inside it, and the half-edges at which it lies beside itself in space.
     pub sizes: Vec<usize>,
     pub inside: Vec<usize>,
-    pub boundaries: Vec<Vec<HalfEdgeId>>,
+    pub meetings: Vec<usize>,
+    pub boundaries: Boundaries,
     /// Per edge, whether it is a seam.
     seam: Vec<bool>,
     /// Per vertex, the number of seam edges at it.
@@ -38,9 +40,6 @@ pub(super) struct Network<'a> {
     pub out: Vec<HalfEdgeId>,
     /// The triangles that were given a label by the seams that are being laid.
     pub claimed: VisitStamps,
-    /// The half-edges and the vertices that the walk along a boundary has visited.
-    pub seen_half_edges: VisitStamps,
-    pub seen_vertices: VisitStamps,
 }
 
 impl<'a> Network<'a> {
@@ -55,14 +54,13 @@ impl<'a> Network<'a> {
             areas: vec![0.0; count],
             sizes: vec![0; count],
             inside: vec![0; count],
-            boundaries: vec![Vec::new(); count],
+            meetings: vec![0; count],
+            boundaries: Boundaries::new(dual, &Partition::new(dual, &labels), count),
             seam: vec![false; edges],
             degree: vec![0; vertices],
             open: open_loops(dual),
             out: vec![HalfEdgeId(0); vertices],
             claimed: VisitStamps::new(faces),
-            seen_half_edges: VisitStamps::new(3 * faces),
-            seen_vertices: VisitStamps::new(vertices),
             labels,
         };
         for (f, label) in made.labels.iter().enumerate() {
@@ -74,10 +72,10 @@ impl<'a> Network<'a> {
             if made.partition().is_seam(h) {
                 made.mark_seam(h, true);
             }
-            if made.partition().is_boundary(h) {
-                let label = made.label(h) as usize;
-                made.boundaries[label].push(h);
-            }
+        }
+        for (h, beyond) in dual.coincidences() {
+            let label = made.label(h);
+            made.meetings[label as usize] += usize::from(beyond.iter().any(|f| made.labels[f.index()] == label));
         }
         for v in 0..vertices {
             made.count_inside(v, 1);
@@ -207,7 +205,8 @@ impl<'a> Network<'a> {
 
     /// The half-edges of all seams, on both sides, chart by chart.
     pub(super) fn seams(&self) -> impl Iterator<Item = HalfEdgeId> {
-        self.boundaries.iter().flatten().copied().filter(|h| self.is_seam(*h))
+        let charts = 0..self.label_count() as u32;
+        charts.flat_map(|label| self.boundaries.around(label)).filter(|h| self.is_seam(*h))
     }
 
     /// The number of charts.
@@ -234,11 +233,6 @@ impl<'a> Network<'a> {
             }
         }
         curves
-    }
-
-    /// Whether `h` bounds the chart `label`.
-    pub(super) fn bounds(&self, h: HalfEdgeId, label: u32) -> bool {
-        self.label(h) == label && self.partition().is_boundary(h)
     }
 
     /// Whether every chart is connected: the one thing that [`Self::reroute`] takes on trust.

@@ -6,6 +6,7 @@
 
 use super::assemble::assemble;
 use super::complex::Complex;
+use super::contacts::{touches_itself, without_contacts};
 use super::dual::Dual;
 use super::features::with_features;
 use super::merge::Limits;
@@ -66,25 +67,19 @@ pub fn split(
     pieces(chart, cut, settings, monitor).map(Some)
 }
 
-/// Cuts `chart` between two of its vertices, numbered within the chart, into at least two charts with the same id. No
-/// triangle may have both as corners.
-///
-/// A chart whose boundary passes twice through one place in space (copies of a vertex at which sheets touch) cannot be
+/// Cuts `chart` into charts with the same id that do not touch themselves, but for what straight seams bring back; none where it does
+/// not. A chart whose boundary passes twice through one place in space (copies of a vertex at which sheets touch) cannot be
 /// handed to meshers, which find places in the plane by those in space.
 ///
 /// # Errors
 /// As [`split`].
-pub fn separate(
-    chart: &Chart,
-    ends: [VertexId; 2],
-    settings: &Settings,
-    monitor: &dyn Monitor,
-) -> Result<Vec<Chart>, Error> {
-    let cut = |dual: &Dual, limits: &Limits| {
-        let sides = Cells { labels: nearer_end(dual, ends), len: 2 };
-        bisected(dual, sides, limits)
-    };
-    pieces(chart, cut, settings, monitor)
+pub fn separate(chart: &Chart, settings: &Settings, monitor: &dyn Monitor) -> Result<Option<Vec<Chart>>, Error> {
+    if !touches_itself(chart) {
+        return Ok(None);
+    }
+    let whole = Cells { labels: vec![0; chart.triangles().len()], len: 1 };
+    let cut = |dual: &Dual, limits: &Limits| Ok(without_contacts(dual, whole, limits)?.labels);
+    pieces(chart, cut, settings, monitor).map(Some)
 }
 
 /// Cuts `chart` into at least two charts with the same id, between the triangles on one side and
@@ -127,15 +122,6 @@ fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
     grow(dual, labels, front)
 }
 
-/// Two vertices of a chart that are copies of one vertex of the input, if there are any.
-pub fn contact(chart: &Chart) -> Option<[VertexId; 2]> {
-    let welded = |v: u32| (chart.welded_vertex(VertexId(v)), v);
-    let mut copies: Vec<(u32, u32)> = (0..chart.vertices().len() as u32).map(welded).collect();
-    copies.sort_unstable();
-    let twice = copies.windows(2).find(|w| w[0].0 == w[1].0)?;
-    Some([VertexId(twice[0].1), VertexId(twice[1].1)])
-}
-
 /// The chart of some triangles of `chart`, ascending, with the same id; none where they form none. `surface` is the chart as a
 /// surface.
 pub(crate) fn part_of(chart: &Chart, surface: &SurfaceMesh, faces: &[FaceId]) -> Option<Chart> {
@@ -174,21 +160,6 @@ fn pieces(
         ..piece.clone()
     };
     Ok(pieces.charts().iter().map(on_surface).collect())
-}
-
-/// Per triangle, which of two vertices is fewer triangles away: 0 or 1. Both parts are connected, as every triangle but
-/// those at the vertices has a neighbour in its part that is nearer.
-fn nearer_end(dual: &Dual, ends: [VertexId; 2]) -> Vec<u32> {
-    let triangles = dual.mesh.triangles();
-    let mut labels = vec![u32::MAX; triangles.len()];
-    let mut front: Vec<FaceId> = Vec::new();
-    for (label, end) in (0..).zip(ends) {
-        for f in (0..triangles.len()).filter(|f| triangles[*f].contains(&end)) {
-            labels[f] = label;
-            front.push(FaceId::at(f));
-        }
-    }
-    grow(dual, labels, front)
 }
 
 /// Gives triangles without a label that of the nearest triangle with one, counted in triangles; `front` are those with one.

@@ -242,7 +242,7 @@ fn a_crease_that_runs_out_is_no_feature() {
 }
 
 /// A tube of which the cross-section is a figure of eight: four sheets meet along a line.
-fn figure_eight(around: u32, length: u32) -> TriangleSoup {
+pub(super) fn figure_eight(around: u32, length: u32) -> TriangleSoup {
     let point = |k: u32| {
         let (sin, cos) = (std::f64::consts::TAU * f64::from(k % around) / f64::from(around)).sin_cos();
         [sin, sin * cos, 0.2 * f64::from(k / around)]

@@ -244,8 +244,8 @@ impl Cutter<'_> {
     /// [`ChartError`].
     pub(super) fn attempt(&self, chart: &Chart) -> Result<Attempt, ChartError> {
         let &Self { settings: &ChartSettings { order, ref decompose, .. }, monitor } = self;
-        if let Some(ends) = decompose::contact(chart) {
-            return Ok(Attempt::Split(decompose::separate(chart, ends, decompose, monitor)?));
+        if let Some(parts) = decompose::separate(chart, decompose, monitor)? {
+            return Ok(Attempt::Split(parts));
         }
         let error = match map_whole(chart, order, decompose.boundary, decompose.max_area_ratio, monitor) {
             Ok(map) => return Ok(Attempt::Mapped(Box::new(map))),

@@ -108,7 +108,7 @@ impl<'a> Parts<'a> {
     /// These triangles as one part, if its map suits a mesher.
     fn mapped(&self, cutter: &Cutter, faces: &[FaceId]) -> Result<Option<Mapped>, ChartError> {
         let part = decompose::part_of(self.chart, &self.surface, faces);
-        let Some(part) = part.filter(|part| decompose::contact(part).is_none()) else { return Ok(None) };
+        let Some(part) = part.filter(|part| !decompose::touches_itself(part)) else { return Ok(None) };
         let map = natural_maps(&part, cutter.settings.order, cutter.monitor)?;
         let suits = map.filter(|map| map.conformal_p99(&part) <= JOINED && map.invalid_share(&part) <= TANGLED);
         Ok(suits.map(|map| (part, map)))
