@@ -21,44 +21,62 @@ pub(super) struct Prediction {
     pub outer: HalfEdgeId,
 }
 
-/// The prediction for every label; none for labels without triangles.
+/// The prediction for every label that is `wanted`; none for others, and for labels without triangles.
 ///
 /// # Errors
 /// [`Interrupted`].
-pub(super) fn evaluate(network: &Network, cells: &Cells) -> Result<Vec<Option<Prediction>>, Interrupted> {
+pub(super) fn evaluate(
+    network: &Network,
+    cells: &Cells,
+    wanted: &[bool],
+) -> Result<Vec<Option<Prediction>>, Interrupted> {
     network.dual.checkpoint()?;
-    let (cut, labels) = cut(network, cells);
+    let mut predictions = vec![None; network.label_count()];
+    let labels: Vec<u32> = (0..network.label_count() as u32).filter(|label| wanted[*label as usize]).collect();
+    if labels.is_empty() {
+        return Ok(predictions);
+    }
+    let Cut { cells: cut, labels: of_pieces } = cut(network, cells, &network.with_neighbours(wanted));
     let complex = Complex::new(network.dual, &cut);
     let graph = CellGraph::new(&complex, network.limits.boundary);
-    let mut regions = Regions::new(&complex, labels, network.label_count());
-    let mut predictions = Vec::with_capacity(network.label_count());
-    for label in 0..network.label_count() {
-        network.dual.checkpoint.after(WORK_PER_CELL * regions.all[label].cells.len())?;
-        let outline = regions.outline_of(label as u32);
-        let map = predict(&complex, &graph, &regions.all[label].cells, &outline.loops);
+    let mut regions = Regions::new(&complex, of_pieces, network.label_count() + 1);
+    for label in labels {
+        network.dual.checkpoint.after(WORK_PER_CELL * regions.all[label as usize].cells.len())?;
+        let outline = regions.outline_of(label);
+        let map = predict(&complex, &graph, &regions.all[label as usize].cells, &outline.loops);
         let first_arc = outline.loops.get(map.outer).and_then(|l| l.first());
         let outer = first_arc.map(|arc| complex.arcs[*arc as usize].first);
-        predictions.push(outer.map(|outer| Prediction { ratio: map.area_ratio, outer }));
+        predictions[label as usize] = outer.map(|outer| Prediction { ratio: map.area_ratio, outer });
     }
     Ok(predictions)
 }
 
 /// The pieces into which labels cut the cells, and the label of each.
-fn cut(network: &Network, cells: &Cells) -> (Cells, Vec<u32>) {
-    let mut labels = Vec::new();
+struct Cut {
+    cells: Cells,
+    labels: Vec<u32>,
+}
+
+/// Cells are cut by labels; whatever has one that `is_cut` tells not to is one piece, of a label that there is not: it costs no more
+/// than its boundary.
+fn cut(network: &Network, cells: &Cells, is_cut: &[bool]) -> Cut {
+    let mut labels = vec![network.label_count() as u32];
     // Per cell its labels with their pieces: mostly one, and hardly ever more than three.
     let mut known: Vec<Vec<(u32, u32)>> = vec![Vec::new(); cells.len];
-    let mut piece = |cell: u32, label: u32| {
-        let known = &mut known[cell as usize];
-        if let Some((_, piece)) = known.iter().find(|k| k.0 == label) {
+    let mut piece = |(cell, label): (&u32, &u32)| {
+        if !is_cut[*label as usize] {
+            return 0;
+        }
+        let known = &mut known[*cell as usize];
+        if let Some((_, piece)) = known.iter().find(|k| k.0 == *label) {
             return *piece;
         }
-        labels.push(label);
-        known.push((label, labels.len() as u32 - 1));
+        labels.push(*label);
+        known.push((*label, labels.len() as u32 - 1));
         labels.len() as u32 - 1
     };
-    let of = cells.labels.iter().zip(&network.labels).map(|(cell, label)| piece(*cell, *label)).collect();
-    (Cells { labels: of, len: labels.len() }, labels)
+    let of = cells.labels.iter().zip(&network.labels).map(&mut piece).collect();
+    Cut { cells: Cells { labels: of, len: labels.len() }, labels }
 }
 
 /// Makes the predicted loops the outer ones.

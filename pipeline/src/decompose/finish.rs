@@ -52,11 +52,11 @@ pub(super) fn finish(
         let clear = |h: HalfEdgeId| SHARE * gaps.clearance[dual.from(h)].min(gaps.clearance[dual.to(h)]);
         let breadth = |h: HalfEdgeId| clear(h).min(band * size(h));
         let step = Step { cells, largest: settings.max_area_ratio, gaps: &gaps, shrink: round == 0 };
-        let StepOutcome::Undone { distorted } = best.step(&step, breadth)? else { continue };
+        let StepOutcome::Undone { distorted } = best.step(&step, |h| Some(breadth(h)))? else { continue };
         // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
         for part in [None].into_iter().chain((0..PARTS).map(Some)) {
             let part_of = best.parts(&distorted);
-            let in_part = |h: HalfEdgeId| if part_of(h) == part { breadth(h) } else { 0.0 };
+            let in_part = |h: HalfEdgeId| (part_of(h) == part).then(|| breadth(h));
             best.step(&step, in_part)?;
         }
     }
@@ -97,13 +97,28 @@ struct Evaluated<'a> {
 
 impl<'a> Evaluated<'a> {
     fn new(network: Network<'a>, cells: &Cells) -> Result<Self, Interrupted> {
-        let predictions = evaluate(&network, cells)?;
+        let predictions = evaluate(&network, cells, &vec![true; network.label_count()])?;
+        Ok(Self { network, predictions, held: BTreeSet::new() })
+    }
+
+    /// The same surface with other labels: only charts that changed are predicted anew, and their neighbours: what is predicted of a
+    /// chart depends on what is around it.
+    fn changed(&self, network: Network<'a>, cells: &Cells) -> Result<Self, Interrupted> {
+        let mut is_changed = vec![false; network.label_count()];
+        for (old, new) in self.network.labels.iter().zip(&network.labels).filter(|(old, new)| old != new) {
+            (is_changed[*old as usize], is_changed[*new as usize]) = (true, true);
+        }
+        let is_new = network.with_neighbours(&is_changed);
+        let mut predictions = evaluate(&network, cells, &is_new)?;
+        for (label, known) in self.predictions.iter().enumerate().filter(|(label, _)| !is_new[*label]) {
+            predictions[label] = *known;
+        }
         Ok(Self { network, predictions, held: BTreeSet::new() })
     }
 
     /// Straightens the seams as far as `breadth` allows, if no chart's ratio rises above the largest one by that;
     /// otherwise all stays.
-    fn step(&mut self, step: &Step, breadth: impl Fn(HalfEdgeId) -> f64) -> Result<StepOutcome, Interrupted> {
+    fn step(&mut self, step: &Step, breadth: impl Fn(HalfEdgeId) -> Option<f64>) -> Result<StepOutcome, Interrupted> {
         let loops = self.loops();
         let mut straight = self.straightened(step, &loops, &breadth)?;
         let known = self.held.len();
@@ -128,15 +143,15 @@ impl<'a> Evaluated<'a> {
         &self,
         step: &Step,
         loops: &Loops,
-        breadth: impl Fn(HalfEdgeId) -> f64,
+        breadth: impl Fn(HalfEdgeId) -> Option<f64>,
     ) -> Result<Self, Interrupted> {
         let edges = self.network.dual.mesh.edges();
         let held = loops.iter().filter(|l| self.held.contains(l.0)).flat_map(|l| l.1);
         let held: BTreeSet<EdgeId> = held.map(|h| edges.edge(*h)).collect();
         let mut network = self.network.clone().keeping(MIN_SHARE);
-        let free = |h: HalfEdgeId| if held.contains(&edges.edge(h)) { 0.0 } else { breadth(h) };
+        let free = |h: HalfEdgeId| if held.contains(&edges.edge(h)) { Some(0.0) } else { breadth(h) };
         straighten(&mut network, &step.gaps.crossing, free)?;
-        Self::new(network, step.cells)
+        self.changed(network, step.cells)
     }
 
     /// The pairs of charts for which the closed seams between them, `before`, became dearer: on a sphere, a loop only
@@ -183,7 +198,7 @@ impl<'a> Evaluated<'a> {
         let is_relaxed = relax(&mut network, BENT, |_| true)?;
         let is_rounded = round_off(&mut network)?;
         let changed = is_relaxed || is_rounded;
-        if changed && network.is_sound() { Self::new(network, cells) } else { Ok(self) }
+        if changed && network.is_sound() { self.changed(network, cells) } else { Ok(self) }
     }
 
     /// Per half-edge on a seam of the charts `labels` its part, counted along the seam; none elsewhere.

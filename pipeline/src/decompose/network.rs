@@ -235,6 +235,23 @@ impl<'a> Network<'a> {
         curves
     }
 
+    /// Per label, whether its chart is one of these, or has a vertex or a coincident edge in common with one.
+    pub(super) fn with_neighbours(&self, labels: &[bool]) -> Vec<bool> {
+        let triangles = self.dual.mesh.triangles();
+        let mut is_touched = vec![false; self.dual.mesh.points().len()];
+        for (t, _) in triangles.iter().zip(&self.labels).filter(|(_, label)| labels[**label as usize]) {
+            t.iter().for_each(|v| is_touched[v.index()] = true);
+        }
+        let mut found = labels.to_vec();
+        for (t, label) in triangles.iter().zip(&self.labels) {
+            found[*label as usize] |= t.iter().any(|v| is_touched[v.index()]);
+        }
+        for (_, beyond) in self.dual.coincidences().filter(|(h, _)| labels[self.label(*h) as usize]) {
+            beyond.iter().for_each(|f| found[self.labels[f.index()] as usize] = true);
+        }
+        found
+    }
+
     /// Whether every chart is connected: the one thing that [`Self::reroute`] takes on trust.
     pub(super) fn is_sound(&self) -> bool {
         let mut parts = self.dual.united(|h, twin| self.label(twin) == self.label(h));

@@ -65,7 +65,9 @@ impl Selection<'_> {
         // Pulled straight without regard to area ratios: these tell below what had to be split for that.
         relax(&mut network, 1.0, |label| open[component[label as usize]])?;
         let mut counts = vec![0; tried.len()];
-        for (component, prediction) in component.into_iter().zip(evaluate(&network, self.cells)?) {
+        let wanted: Vec<bool> = component.iter().map(|c| open[*c]).collect();
+        let predictions = evaluate(&network, self.cells, &wanted)?;
+        for (component, prediction) in component.into_iter().zip(predictions) {
             counts[component] += self.parts(prediction);
         }
         Ok(counts)

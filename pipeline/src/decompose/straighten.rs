@@ -35,8 +35,8 @@ struct Straightening<'n, 'a> {
     dual: &'a Dual<'a>,
     trees: [Tree; 3],
     reach: f64,
-    /// Per vertex, whether it is near enough to the first seams.
-    band: Vec<bool>,
+    /// Where seams may lie.
+    band: Band,
     /// Per edge, whether no seam may move along it.
     barred: &'n [bool],
     /// A change is made where the length falls to this share.
@@ -65,19 +65,19 @@ enum Shortened {
     Illegal,
 }
 
-/// Straightens all seams of `network`. None moves farther than `breadth` tells at one of its half-edges, nor along a
-/// `barred` edge.
+/// Straightens seams of `network`. None moves farther than `breadth` tells at one of its half-edges, nor along a `barred` edge; where it
+/// tells nothing, the seam stays as it is.
 ///
 /// # Errors
 /// [`Interrupted`]: the network is half way between two states then, and no use any more.
 pub(super) fn straighten(
     network: &mut Network,
     barred: &[bool],
-    breadth: impl Fn(HalfEdgeId) -> f64,
+    breadth: impl Fn(HalfEdgeId) -> Option<f64>,
 ) -> Result<(), Interrupted> {
     let dual = network.dual;
     let reach = REACH * (dual.total_area() / network.charts().max(1) as f64).sqrt();
-    let band = band(network, breadth)?;
+    let band = Band::around(network, breadth)?;
     let mut work = Straightening::new(network, reach, band, barred);
     let mut before = work.total();
     for _ in 0..ROUNDS {
@@ -99,7 +99,7 @@ pub(super) fn straighten(
 /// # Errors
 /// As [`straighten`].
 pub(super) fn relax(network: &mut Network, bent: f64, wanted: impl Fn(u32) -> bool) -> Result<bool, Interrupted> {
-    let everywhere = vec![true; network.dual.mesh.points().len()];
+    let everywhere = Band::everywhere(network.dual);
     let barred = vec![false; network.dual.mesh.edges().len()];
     let mut work = Straightening { share: 1.0 / bent, ..Straightening::new(network, 0.0, everywhere, &barred) };
     let mut changed = false;
@@ -124,7 +124,7 @@ pub(super) fn relax(network: &mut Network, bent: f64, wanted: impl Fn(u32) -> bo
 /// # Errors
 /// As [`straighten`].
 pub(super) fn round_off(network: &mut Network) -> Result<bool, Interrupted> {
-    let everywhere = vec![true; network.dual.mesh.points().len()];
+    let everywhere = Band::everywhere(network.dual);
     let barred = vec![false; network.dual.mesh.edges().len()];
     let mut work = Straightening::new(network, 0.0, everywhere, &barred);
     let mut changed = false;
@@ -144,7 +144,7 @@ pub(super) const RELAXED: f64 = 0.1;
 const PINS: usize = 4;
 
 impl<'n, 'a> Straightening<'n, 'a> {
-    fn new(network: &'n mut Network<'a>, reach: f64, band: Vec<bool>, barred: &'n [bool]) -> Self {
+    fn new(network: &'n mut Network<'a>, reach: f64, band: Band, barred: &'n [bool]) -> Self {
         let dual = network.dual;
         let trees = [(); 3].map(|()| Tree::new(dual));
         Self { network, dual, trees, reach, band, barred, share: 1.0 - GAIN, vain: BTreeSet::new() }
@@ -157,6 +157,9 @@ impl<'n, 'a> Straightening<'n, 'a> {
     /// One pass over all seams.
     fn seams(&mut self) -> Result<(), Interrupted> {
         for path in self.network.curves() {
+            if !self.band.lets_move(self.dual, &path) {
+                continue;
+            }
             let closed = self.dual.is_closed(&path);
             let tried = Tried::Seam(path.clone());
             if self.vain.contains(&tried) {
@@ -210,7 +213,7 @@ impl<'n, 'a> Straightening<'n, 'a> {
             goal: Goal::Vertex(to),
             labels: &labels,
             length: self.share * before,
-            band: &self.band,
+            band: &self.band.vertices,
             barred: self.barred,
         };
         self.trees[0].grow(self.network, from, &bounds)?;
@@ -248,6 +251,9 @@ impl<'n, 'a> Straightening<'n, 'a> {
                 _ => continue,
             };
             let arms: Vec<_> = seams.iter().map(|h| self.network.follow(*h, self.reach)).collect();
+            if !arms.iter().any(|arm| self.band.lets_move(self.dual, arm)) {
+                continue;
+            }
             let tried = Tried::Corner(vertex, arms.concat());
             if self.vain.contains(&tried) {
                 continue;
@@ -307,8 +313,13 @@ impl<'n, 'a> Straightening<'n, 'a> {
     ) -> Result<Option<Vec<Vec<HalfEdgeId>>>, Interrupted> {
         let length = self.share * before;
         let [first, second, third] = &mut self.trees;
-        let meeting =
-            |a, b| Bounds { goal: Goal::Meeting([a, b]), labels, length, band: &self.band, barred: self.barred };
+        let meeting = |a, b| Bounds {
+            goal: Goal::Meeting([a, b]),
+            labels,
+            length,
+            band: &self.band.vertices,
+            barred: self.barred,
+        };
         // Each tree knows the distances that those before it have found, and so looks at less.
         first.grow(self.network, ends[0], &meeting((ends[1], None), (ends[2], None)))?;
         second.grow(self.network, ends[1], &meeting((ends[0], Some(first)), (ends[2], None)))?;
@@ -343,7 +354,7 @@ impl<'n, 'a> Straightening<'n, 'a> {
             goal: Goal::OpenLoop(end),
             labels: &labels,
             length: self.share * before,
-            band: &self.band,
+            band: &self.band.vertices,
             barred: self.barred,
         };
         let tree = &mut self.trees[0];
@@ -358,26 +369,50 @@ impl<'n, 'a> Straightening<'n, 'a> {
     }
 }
 
-/// The vertices on seams, and those no farther from one than `breadth` at one of its half-edges.
-fn band(network: &Network, breadth: impl Fn(HalfEdgeId) -> f64) -> Result<Vec<bool>, Interrupted> {
-    let dual = network.dual;
-    let vertices = dual.mesh.points().len();
-    // Every vertex of a seam begins as far ahead of 0 as the band is broad there: what is reached before 0 lies in it.
-    let mut paths = ShortestPaths::new(vertices, ());
-    for h in network.seams() {
-        let breadth = breadth(h);
-        if breadth > 0.0 {
-            paths.reach(dual.from(h), -breadth, ());
-        }
+/// Where seams may lie.
+struct Band {
+    /// Per vertex, whether it lies on a seam, or near enough to the first seams.
+    vertices: Vec<bool>,
+    /// Per vertex, whether it lies on one of the first seams that may move, or near enough to it.
+    is_free: Vec<bool>,
+}
+
+impl Band {
+    fn everywhere(dual: &Dual) -> Self {
+        let vertices = vec![true; dual.mesh.points().len()];
+        Self { is_free: vertices.clone(), vertices }
     }
-    while let Some(node) = paths.settle() {
-        dual.checkpoint.after(1)?;
-        network.each_out(node.index, |h| {
-            let distance = node.distance + dual.length(h);
-            if distance < 0.0 {
-                paths.reach(dual.to(h), distance, ());
+
+    /// The vertices on seams, and those no farther from one than `breadth` at one of its half-edges, if it is told.
+    fn around(network: &Network, breadth: impl Fn(HalfEdgeId) -> Option<f64>) -> Result<Self, Interrupted> {
+        let dual = network.dual;
+        let vertices = dual.mesh.points().len();
+        // Every vertex of a seam begins as far ahead of 0 as the band is broad there: what is reached before 0 lies in it.
+        let mut paths = ShortestPaths::new(vertices, ());
+        let mut is_free = vec![false; vertices];
+        for h in network.seams() {
+            let Some(breadth) = breadth(h) else { continue };
+            is_free[dual.from(h)] = true;
+            if breadth > 0.0 {
+                paths.reach(dual.from(h), -breadth, ());
             }
-        });
+        }
+        while let Some(node) = paths.settle() {
+            dual.checkpoint.after(1)?;
+            network.each_out(node.index, |h| {
+                let distance = node.distance + dual.length(h);
+                if distance < 0.0 {
+                    paths.reach(dual.to(h), distance, ());
+                }
+            });
+        }
+        (0..vertices).for_each(|v| is_free[v] |= paths.distance(v).is_some());
+        let vertices = (0..vertices).map(|v| is_free[v] || network.degree(v) > 0).collect();
+        Ok(Self { vertices, is_free })
     }
-    Ok((0..vertices).map(|v| paths.distance(v).is_some() || network.degree(v) > 0).collect())
+
+    /// Whether a seam may move anywhere. Where seams are straightened part by part most may not, and need not be tried.
+    fn lets_move(&self, dual: &Dual, path: &[HalfEdgeId]) -> bool {
+        path.iter().any(|h| self.is_free[dual.from(*h)] || self.is_free[dual.to(*h)])
+    }
 }
