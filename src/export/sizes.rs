@@ -46,8 +46,8 @@ pub(super) struct Varying {
 const MOST_CUBES: usize = 500_000;
 const TRIANGLES_PER_CUBE: usize = 2;
 
-/// Where that is not enough, they ask for no less than these shares of the size, one after the other, and at last for nothing.
-const FLOORS: [f64; 3] = [0.0, 1.0 / 16.0, 1.0 / 4.0];
+/// Where that is not enough, they ask for no less than the first of these shares of the size that is, and at last for nothing.
+const FLOORS: [f64; 2] = [1.0 / 16.0, 1.0 / 4.0];
 
 /// So many of the places are told where smaller elements are needed than may be.
 const TOLD: usize = 8;
@@ -82,9 +82,13 @@ pub(super) fn varying(
         Some(found)
     };
     let at_most = MOST_CUBES.max(surface.len() / TRIANGLES_PER_CUBE);
-    let found = FLOORS.into_iter().find_map(|share| with_floor(share, at_most));
+    let held = || {
+        // Where the highest floor takes too many cubes, so do lower ones: each takes as long as half a million cubes.
+        let highest = with_floor(FLOORS[1], at_most)?;
+        Some(with_floor(FLOORS[0], at_most).unwrap_or(highest))
+    };
     // What is asked for is told, however much it takes.
-    found.or_else(|| with_floor(1.0, usize::MAX)).unwrap_or_default()
+    with_floor(0.0, at_most).or_else(held).or_else(|| with_floor(1.0, usize::MAX)).unwrap_or_default()
 }
 
 /// The places with sizes held above the least one that may be.

@@ -130,3 +130,11 @@ def write(path, family, triangles):
     with open(path, "wb") as file:
         file.write(family.encode().ljust(80, b"\0") + np.uint32(len(cells)).tobytes() + facets.tobytes())
     return len(cells)
+
+
+if __name__ == "__main__":
+    import sys
+
+    if len(sys.argv) != 4 or sys.argv[1] not in FAMILIES:
+        sys.exit(f"usage: families.py {'|'.join(FAMILIES)} TRIANGLES FILE.stl")
+    print(write(sys.argv[3], sys.argv[1], int(sys.argv[2])))

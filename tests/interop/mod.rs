@@ -5,6 +5,7 @@
 //! it, with the packages of requirements.txt.
 
 mod also;
+mod growth;
 pub mod matrix;
 pub mod naming;
 pub mod recipe;

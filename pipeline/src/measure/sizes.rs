@@ -111,29 +111,23 @@ impl SizeField {
     }
 
     /// The field on cubes that cover the triangles of a surface where it is below `most`, where sizes are cut off; none where that
-    /// takes more than `at_most` cubes, those counted of which it is not known yet whether they are halved: they are looked at level
-    /// by level, and a field that takes too many is given up after an eighth of the work (mri_brain_iso, three times).
+    /// takes more than `at_most` cubes.
     ///
     /// It ends: sizes are positive, and sides become shorter than any of them.
     pub fn told(&self, surface: &[[Vec3; 3]], most: f64, at_most: usize) -> Option<Vec<SizedCube>> {
-        let mut told: Vec<(u128, SizedCube)> = Vec::new();
+        let mut told = Vec::new();
         let mut waiting: Vec<Cell> = self.whole(surface, most).into_iter().collect();
-        while !waiting.is_empty() {
-            let mut halved = Vec::new();
-            for cell in waiting {
-                if let Some(lattice) = self.needed_lattice(&cell, most) {
-                    halved.extend((0..8).filter_map(|octant| self.octant(&cell, octant, &lattice, surface, most)));
-                } else if cell.cube.sizes.iter().any(|size| *size < most) {
-                    told.push((cell.place, cell.cube));
-                }
-                if told.len() + halved.len() > at_most {
+        while let Some(cell) = waiting.pop() {
+            if let Some(lattice) = self.needed_lattice(&cell, most) {
+                waiting.extend((0..8).filter_map(|octant| self.octant(&cell, octant, &lattice, surface, most)));
+            } else if cell.cube.sizes.iter().any(|size| *size < most) {
+                if told.len() == at_most {
                     return None;
                 }
+                told.push(cell.cube);
             }
-            waiting = halved;
         }
-        told.sort_unstable_by_key(|(place, _)| *place);
-        Some(told.into_iter().map(|(_, cube)| cube).collect())
+        Some(told)
     }
 
     /// The cube around all of a surface; none where nothing is asked for.
@@ -151,7 +145,7 @@ impl SizeField {
         let all: Vec<Near> = (0..self.places.len() as u32).map(|place| Near { place, at_least: 0.0 }).collect();
         let places = self.near(&cube, &all, most);
         let faces = (0..surface.len() as u32).collect();
-        (!places.is_empty()).then_some(Cell { cube, places, faces, halvings: 0, place: 0 })
+        (!places.is_empty()).then_some(Cell { cube, places, faces, halvings: 0 })
     }
 
     /// Those places that ask for the least at some point of a cube, or may do so, the least of what they may ask first. Of places that
@@ -244,10 +238,7 @@ impl SizeField {
             return None;
         }
         let places = self.near(&cube, &cell.places, most);
-        let halvings = cell.halvings + 1;
-        // The last octant comes first.
-        let place = cell.place | (7 - octant as u128) << (3 * (MAX_HALVINGS - halvings));
-        (!places.is_empty()).then_some(Cell { cube, places, faces, halvings, place })
+        (!places.is_empty()).then_some(Cell { cube, places, faces, halvings: cell.halvings + 1 })
     }
 }
 
@@ -281,8 +272,6 @@ struct Cell {
     faces: Vec<u32>,
     /// How often it was halved.
     halvings: u32,
-    /// Its place in an order in which all cubes of an octant lie together: three bits for every halving.
-    place: u128,
 }
 
 impl Cell {
