@@ -148,7 +148,8 @@ fn prediction_agrees_with_the_map_within_a_decade() {
         let limits = Limits::new(&smooth());
         let (cells, _) = cells(&dual, &limits).expect("nobody cancels");
         let network = network::Network::new(&dual, vec![0; mesh.triangles().len()], limits);
-        let predicted = evaluate::evaluate(&network, &cells).expect("nobody interrupts")[0].expect("a chart").ratio;
+        let predicted =
+            evaluate::evaluate(&network, &cells, &[true]).expect("nobody interrupts")[0].expect("a chart").ratio;
         let chart = assemble(&mesh, &network.labels).expect("a disk").into_charts().remove(0);
         let measured = parametrize_chart(chart, Order::Linear).expect("maps").distortion().area_ratio;
         assert!((predicted / measured).log10().abs() < 1.0, "length {length}: {predicted:.1e}, {measured:.1e}");
@@ -274,6 +275,35 @@ fn no_chart_meets_itself_where_sheets_were_taken_apart() {
         places.dedup();
         assert_eq!(places.len(), all, "chart {} meets itself", chart.id());
     }
+}
+
+/// A sheet of 8 by 4 `n` squares, folded in the middle: its upper half touches the lower one at `n / 2` points.
+fn folded(n: u32) -> TriangleSoup {
+    let point = |i: u32, j: u32| {
+        let x = i.min(4 * n - i);
+        let touches = j == 4 && x % 4 == 2;
+        [f64::from(x), f64::from(j), if i > 2 * n && !touches { 0.5 } else { 0.0 }]
+    };
+    let points = (0..=4 * n).flat_map(|i| (0..=8).map(move |j| (i, j))).map(|(i, j)| point(i, j)).collect();
+    let quad = |(i, j): (u32, u32)| shapes::halves([9 * i + j, 9 * i + j + 9, 9 * i + j + 10, 9 * i + j + 1]);
+    let triangles = (0..4 * n).flat_map(|i| (0..8).map(move |j| (i, j))).flat_map(quad).collect();
+    TriangleSoup::new(points, triangles).expect("sound")
+}
+
+#[test]
+fn a_chart_that_touches_itself_at_many_points_is_cut_once() {
+    let mesh = surface(&folded(12));
+    assert_eq!(mesh.topology_summary().nonmanifold_vertices, 6);
+    let atlas = decompose(&mesh, &smooth(), &NoMonitor).expect("an atlas");
+    assert_eq!(atlas.charts().len(), 2);
+    assert!(!atlas.charts().iter().any(touches_itself));
+    // One chart that is cut when it is mapped.
+    let whole = assemble(&mesh, &vec![0; mesh.triangles().len()]).expect("a disk").into_charts().remove(0);
+    assert!(touches_itself(&whole));
+    let parts = separate(&whole, &smooth(), &NoMonitor).expect("charts").expect("it touches itself");
+    assert_eq!(parts.len(), 2);
+    assert!(!parts.iter().any(touches_itself));
+    assert!(separate(&parts[0], &smooth(), &NoMonitor).expect("charts").is_none());
 }
 
 /// Two square faces at a right angle with a bevel of this width between them.
