@@ -83,15 +83,28 @@ pub(super) struct Merge<'a, 'b> {
 }
 
 impl Merge<'_, '_> {
-    /// Unites neighbours until no union is allowed. Ends because every union leaves one region less, and every
-    /// candidate is judged once.
+    /// Unites neighbours until no union is allowed, group by group: one knows nothing of the others, and is left in the processor's
+    /// caches while it is at work (167 spheres in one file took seven times as long as 42 when all waited in one heap).
     pub(super) fn run(&mut self) -> Result<(), Interrupted> {
         let mut version = vec![0_u32; self.regions.all.len()];
+        let mut members: Vec<u32> = (0..version.len() as u32).collect();
+        let group = |a: &u32| self.groups[*a as usize];
+        members.sort_by_key(group);
+        let groups: Vec<&[u32]> = members.chunk_by(|a, b| group(a) == group(b)).collect();
+        for members in groups {
+            self.run_group(members, &mut version)?;
+        }
+        Ok(())
+    }
+
+    /// The same for the regions of one group, ascending. Ends because every union leaves one region less, and every candidate is
+    /// judged once.
+    fn run_group(&mut self, members: &[u32], version: &mut [u32]) -> Result<(), Interrupted> {
         let mut heap = BinaryHeap::new();
-        for a in 0..version.len() as u32 {
+        for a in members.iter().copied() {
             self.checkpoint.after(self.regions.all[a as usize].boundary.len())?;
             for b in self.regions.neighbours(a).into_iter().filter(|b| a < *b) {
-                heap.extend(self.candidate((a, b), &version));
+                heap.extend(self.candidate((a, b), version));
             }
         }
         while let Some(best) = heap.pop() {
@@ -113,7 +126,7 @@ impl Merge<'_, '_> {
             version[a as usize] += 1;
             version[b as usize] += 1;
             for c in self.regions.neighbours(a).into_iter().filter(|c| *c != a) {
-                heap.extend(self.candidate((a.min(c), a.max(c)), &version));
+                heap.extend(self.candidate((a.min(c), a.max(c)), version));
             }
         }
         Ok(())
