@@ -142,11 +142,11 @@ impl Boundaries {
             charts: vec![OfChart::default(); labels],
         };
         let mut of_labels = vec![Vec::new(); labels];
-        for h in dual.half_edges().filter(|h| partition.is_boundary(*h)) {
+        for h in partition.boundary() {
             of_labels[partition.label(h) as usize].push(h);
         }
         for (label, come) in (0..).zip(of_labels) {
-            if let Some(change) = made.change_of_all(dual, partition, label, &come) {
+            if let Some(change) = made.change_by(dual, partition, label, vec![], &come) {
                 made.make(dual, change);
             }
         }
@@ -181,31 +181,21 @@ impl Boundaries {
                 _ => {}
             }
         }
-        if let Some(change) = self.change_of_few(dual, partition, label, gone, &come) {
+        if let Some(change) = self.change_by(dual, partition, label, gone, &come) {
             return Some(change);
         }
+        // All of it is taken anew: where no pieces are left there is nothing to decide.
         let around = self.around(label);
         let mut all: Vec<HalfEdgeId> = around.into_iter().chain(come).collect();
         all.sort_unstable();
         all.retain(|h| partition.label(*h) == label && partition.is_boundary(*h));
-        self.change_of_all(dual, partition, label, &all)
-    }
-
-    /// That to the boundary `come`, ascending, whatever it was.
-    fn change_of_all(
-        &mut self,
-        dual: &Dual,
-        partition: &Partition<Dual>,
-        label: u32,
-        come: &[HalfEdgeId],
-    ) -> Option<Change> {
         let gone = self.charts[label as usize].sides.clone();
-        self.change_of_few(dual, partition, label, gone, come)
+        self.change_by(dual, partition, label, gone, &all)
     }
 
     /// That by the sides `gone` and the half-edges `come`, ascending; none where more than one piece of a loop is left, or a new one
     /// begins in the middle of a piece.
-    fn change_of_few(
+    fn change_by(
         &mut self,
         dual: &Dual,
         partition: &Partition<Dual>,

@@ -8,11 +8,11 @@
 use super::complex::Complex;
 use super::dual::Dual;
 use super::merge::Limits;
-use super::split::legal;
+use super::split::{grow, legal};
 use super::voronoi::{Cells, bisect_until};
 use crate::atlas::Chart;
 use crate::monitor::Interrupted;
-use crate::topology::{FaceId, HalfEdgeId, Stars, VertexId};
+use crate::topology::{FaceId, Stars, VertexId};
 
 /// Whether two vertices of a chart are copies of one vertex of the input.
 pub(crate) fn touches_itself(chart: &Chart) -> bool {
@@ -118,23 +118,13 @@ impl<'a> Contacts<'a> {
         // The first side has a label of its own while the part is visited.
         let (second, first) = (self.parts.len as u32, self.parts.len as u32 + 1);
         let [at_first, at_second] = ends.map(|end| self.around(end, part));
-        let mut visited: Vec<(FaceId, u32)> = at_first.into_iter().map(|f| (f, first)).collect();
-        visited.extend(at_second.into_iter().map(|f| (f, second)));
-        visited.iter().for_each(|(f, side)| self.parts.labels[f.index()] = *side);
-        // Breadth first: each triangle enters once.
-        let mut next = 0;
-        while let Some(&(face, side)) = visited.get(next) {
-            next += 1;
-            for h in face.sides() {
-                let Some(other) = self.dual.twin(h).map(HalfEdgeId::face) else { continue };
-                if self.parts.labels[other.index()] == part {
-                    self.parts.labels[other.index()] = side;
-                    visited.push((other, side));
-                }
-            }
+        at_first.iter().for_each(|f| self.parts.labels[f.index()] = first);
+        at_second.iter().for_each(|f| self.parts.labels[f.index()] = second);
+        let visited = grow(self.dual, &mut self.parts.labels, part, [at_first, at_second].concat());
+        for face in &visited {
+            let label = &mut self.parts.labels[face.index()];
+            *label = if *label == first { part } else { *label };
         }
-        let of_first = visited.iter().filter(|(_, side)| *side == first);
-        of_first.for_each(|(f, _)| self.parts.labels[f.index()] = part);
         self.parts.len += 1;
         visited.len()
     }

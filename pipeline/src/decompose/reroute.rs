@@ -255,15 +255,15 @@ mod tests {
             (shapes::ring_torus(24, 16), 9),
             (figure_eight(24, 12), 9),
         ];
-        let (mut laid, mut undone) = (0, 0);
         for (soup, charts) in surfaces {
             let mesh = repair(&soup, &Settings::default()).expect("a surface is left").mesh;
             let dual = Dual::new(&mesh, &NoMonitor);
             let cells = compact_cells(&dual, |_| charts, &dual.checkpoint).expect("nobody cancels");
-            let largest = 11 * mesh.triangles().len() / charts / 10;
+            let largest = 11 * mesh.triangles().len() / cells.len / 10;
             let limits = Limits::new(&decompose::Settings { max_triangles: largest, ..Default::default() });
             let mut network = Network::new(&dual, cells.labels, limits);
             let mut random = Random(7);
+            let (mut laid, mut undone) = (0, 0);
             for _ in 0..200 {
                 let before = network.labels.clone();
                 match reroute_some(&mut network, &mut random) {
@@ -275,7 +275,7 @@ mod tests {
                 }
                 compare(&network);
             }
+            assert!(laid > 10 && undone > 10, "{laid} laid, {undone} undone");
         }
-        assert!(laid > 100 && undone > 50, "{laid} laid, {undone} undone");
     }
 }

@@ -119,7 +119,8 @@ fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
         }
     }
     let front = (0..count).filter(|f| labels[*f] != u32::MAX).map(FaceId::at).collect();
-    grow(dual, labels, front)
+    grow(dual, &mut labels, u32::MAX, front);
+    labels
 }
 
 /// The chart of some triangles of `chart`, ascending, with the same id; none where they form none. `surface` is the chart as a
@@ -162,23 +163,22 @@ fn pieces(
     Ok(pieces.charts().iter().map(on_surface).collect())
 }
 
-/// Gives triangles without a label that of the nearest triangle with one, counted in triangles; `front` are those with one.
-fn grow(dual: &Dual, mut labels: Vec<u32>, mut front: Vec<FaceId>) -> Vec<u32> {
+/// Gives triangles with the label `none` that of the nearest with another one, counted in triangles, as far as they are connected to
+/// `front`, which have one already. Returns these and those that were given one.
+pub(super) fn grow(dual: &Dual, labels: &mut [u32], none: u32, front: Vec<FaceId>) -> Vec<FaceId> {
+    let mut visited = front;
+    let mut next = 0;
     // Breadth first: each triangle enters once.
-    while !front.is_empty() {
-        let mut next = Vec::new();
-        for face in front {
-            for h in (0..3).map(|k| HalfEdgeId::side_of(face, k)) {
-                let Some(other) = dual.twin(h).map(HalfEdgeId::face) else { continue };
-                if labels[other.index()] == u32::MAX {
-                    labels[other.index()] = labels[face.index()];
-                    next.push(other);
-                }
+    while let Some(face) = visited.get(next).copied() {
+        next += 1;
+        for other in face.sides().into_iter().filter_map(|h| dual.twin(h).map(HalfEdgeId::face)) {
+            if labels[other.index()] == none {
+                labels[other.index()] = labels[face.index()];
+                visited.push(other);
             }
         }
-        front = next;
     }
-    labels
+    visited
 }
 
 /// Two parts of about the same size; more where these are no charts.
