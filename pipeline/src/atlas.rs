@@ -33,6 +33,17 @@ impl Chart {
         self.id
     }
 
+    /// The same chart, which was cut from a part of a surface, on that surface: there it is `id`, and the part has these `vertices`
+    /// and `faces`, ascending.
+    pub(crate) fn on_surface(self, id: ChartId, vertices: &[VertexId], faces: &[FaceId]) -> Self {
+        Self {
+            id,
+            vertices: self.vertices.iter().map(|v| vertices[v.index()]).collect(),
+            faces: self.faces.iter().map(|f| faces[f.index()]).collect(),
+            ..self
+        }
+    }
+
     /// Per vertex of the chart, the vertex of the surface.
     pub fn vertices(&self) -> &[VertexId] {
         &self.vertices

@@ -1,4 +1,5 @@
-//! What watches over a computation: whether its result is still wanted, whose turn it is, and how much memory it may take.
+//! What watches over a computation: whether its result is still wanted, whose turn it is, how much memory it may take, and whether
+//! some of it can be done at the same time.
 //!
 //! The core knows no thread and no clock. It asks a [`Monitor`] at safe points, many times a second, and waits there as
 //! long as the monitor lets it: so a computation can be interrupted, or let others pass. What it computes does not depend
@@ -8,9 +9,14 @@
 //! Memory is reserved before a sparse system is factorised, which takes more of it than all else together. **A
 //! computation holds at most one reservation at a time, and is at no safe point while it holds one**: each is made and
 //! given back within one solution of a system ([`crate::fem::sparse`]). So whoever waits for memory waits for computations
-//! that wait for nothing, and budgets cannot deadlock.
+//! that wait for nothing, and budgets cannot deadlock. What is done at the same time ([`Monitor::together`]) are computations of
+//! their own in this.
 
 use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A part of a computation that needs none of its other parts; it is given the monitor that it must ask.
+pub type Task<'a> = Box<dyn FnOnce(&dyn Monitor) + Send + 'a>;
 
 /// What watches over a computation. It may be asked by many of them at once; where some are to be interrupted and others
 /// not, each has a monitor of its own.
@@ -25,6 +31,50 @@ pub trait Monitor: Sync {
 
     /// Gives reserved memory back: as much as was reserved, also when a computation fails or panics.
     fn release(&self, bytes: u64);
+
+    /// Does all `tasks`, and returns when the last one is done. They are begun in their order; whoever has processors to spare does
+    /// some of them at the same time, and whoever has not does [`one_by_one`]. Nothing is reserved meanwhile by whoever calls it.
+    fn together(&self, tasks: Vec<Task<'_>>);
+}
+
+/// Does `tasks` one after another, under one monitor: how [`Monitor::together`] is done where there is one processor.
+pub fn one_by_one(tasks: Vec<Task<'_>>, monitor: &dyn Monitor) {
+    tasks.into_iter().for_each(|task| task(monitor));
+}
+
+/// Work on so many triangles is done by whoever has it: to hand half of it to another thread, and to wait for that, takes as long as
+/// a hundred.
+const LITTLE: usize = 2_000;
+
+/// What `work` makes of each of `items`, which have so many `triangles` in all, in their order; some at the same time, where the
+/// monitor has processors to spare. Behind a failure no more are begun.
+///
+/// # Errors
+/// That of the first item for which `work` fails.
+pub(crate) fn try_each<T: Send, R: Send, E: Send>(
+    monitor: &dyn Monitor,
+    items: Vec<T>,
+    triangles: usize,
+    work: impl Fn(T, &dyn Monitor) -> Result<R, E> + Sync,
+) -> Result<Vec<R>, E> {
+    if items.len() < 2 || triangles < LITTLE {
+        return items.into_iter().map(|item| work(item, monitor)).collect();
+    }
+    let mut done: Vec<Option<Result<R, E>>> = items.iter().map(|_| None).collect();
+    let (work, has_failed) = (&work, &AtomicBool::new(false));
+    let mut tasks: Vec<Task<'_>> = Vec::with_capacity(items.len());
+    for (item, done) in items.into_iter().zip(&mut done) {
+        tasks.push(Box::new(move |monitor| {
+            if !has_failed.load(Ordering::Relaxed) {
+                let result = work(item, monitor);
+                has_failed.fetch_or(result.is_err(), Ordering::Relaxed);
+                *done = Some(result);
+            }
+        }));
+    }
+    monitor.together(tasks);
+    // Those before the first failure were begun before it, and have ended.
+    done.into_iter().flatten().collect()
 }
 
 /// Nobody waits, nothing is limited.
@@ -39,6 +89,10 @@ impl Monitor for NoMonitor {
     fn reserve(&self, _bytes: u64) {}
 
     fn release(&self, _bytes: u64) {}
+
+    fn together(&self, tasks: Vec<Task<'_>>) {
+        one_by_one(tasks, self);
+    }
 }
 
 /// The result was not wanted any more.
@@ -149,6 +203,11 @@ mod tests {
         fn release(&self, bytes: u64) {
             assert_eq!(self.reserved.swap(0, Relaxed), bytes);
         }
+
+        fn together(&self, tasks: Vec<Task<'_>>) {
+            assert_eq!(self.reserved.load(Relaxed), 0, "tasks reserve for themselves");
+            one_by_one(tasks, self);
+        }
     }
 
     fn surface(soup: &TriangleSoup) -> SurfaceMesh {
@@ -225,6 +284,10 @@ mod tests {
         fn reserve(&self, _bytes: u64) {}
 
         fn release(&self, _bytes: u64) {}
+
+        fn together(&self, tasks: Vec<Task<'_>>) {
+            one_by_one(tasks, self);
+        }
     }
 
     #[test]

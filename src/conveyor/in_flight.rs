@@ -17,8 +17,9 @@ use crate::system::escape::escape;
 use crate::system::vitals;
 use crossbeam_channel::Sender;
 use parking_lot::{Mutex, RwLock};
-use planish_core::monitor::Monitor;
-use std::collections::BTreeMap;
+use planish_core::monitor::{Monitor, Task, one_by_one};
+use std::collections::{BTreeMap, VecDeque};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -156,14 +157,21 @@ impl InFlight {
     /// out for a job that nobody wants any more is dropped.
     pub fn compute<T>(&self, stage: Stage, work: impl FnOnce(&dyn Monitor) -> Result<T, Abort>) -> Result<T, Abort> {
         self.reached(stage);
-        let permit = Permit::take(self);
-        let _in_stage = self.in_stage(stage);
-        let started = vitals::processor_of_this_thread();
-        let result = if self.job.is_wanted() { guard(|| work(&permit)) } else { Err(Abort::Unwanted) };
-        let taken = vitals::processor_of_this_thread() - started;
-        *self.seconds.lock().entry(stage.name()).or_insert(0.0) += taken.as_secs_f64();
+        let result = self
+            .inside(stage, |permit| if self.job.is_wanted() { guard(|| work(permit)) } else { Err(Abort::Unwanted) });
         // It may have been cancelled meanwhile: then nothing goes on, whatever came out.
         if self.job.is_wanted() { result } else { Err(Abort::Unwanted) }
+    }
+
+    /// Does work of a stage once there is a place for it, its processor time booked.
+    fn inside<T>(&self, stage: Stage, work: impl FnOnce(&Permit) -> T) -> T {
+        let permit = Permit::take(self, stage);
+        let _in_stage = self.in_stage(stage);
+        let started = vitals::processor_of_this_thread();
+        let result = work(&permit);
+        let taken = vitals::processor_of_this_thread() - started;
+        *self.seconds.lock().entry(stage.name()).or_insert(0.0) += taken.as_secs_f64();
+        result
     }
 
     /// Log messages until the end of what is returned are those of this job and stage.
@@ -236,24 +244,27 @@ fn begin(shared: &Shared, job: &Job) -> Option<Suspect> {
 }
 
 /// A place inside the semaphore.
-struct Permit<'a>(&'a InFlight);
+struct Permit<'a> {
+    in_flight: &'a InFlight,
+    stage: Stage,
+}
 
 impl<'a> Permit<'a> {
-    fn take(in_flight: &'a InFlight) -> Self {
+    fn take(in_flight: &'a InFlight, stage: Stage) -> Self {
         in_flight.shared.grants.enter(in_flight.turn);
-        Self(in_flight)
+        Self { in_flight, stage }
     }
 }
 
 impl Drop for Permit<'_> {
     fn drop(&mut self) {
-        self.0.shared.grants.leave();
+        self.in_flight.shared.grants.leave();
     }
 }
 
 impl Monitor for Permit<'_> {
     fn should_continue(&self) -> bool {
-        let InFlight { shared, turn, job, .. } = self.0;
+        let InFlight { shared, turn, job, .. } = self.in_flight;
         shared.step();
         if job.is_wanted() {
             shared.grants.yield_to(*turn);
@@ -262,7 +273,7 @@ impl Monitor for Permit<'_> {
     }
 
     fn reserve(&self, bytes: u64) {
-        let InFlight { shared, turn, job, .. } = self.0;
+        let InFlight { shared, turn, job, .. } = self.in_flight;
         if !job.is_wanted() {
             // It ends at its next safe point, and must not wait until then.
             shared.grants.overdraw(Account::Factor, bytes);
@@ -276,7 +287,48 @@ impl Monitor for Permit<'_> {
     }
 
     fn release(&self, bytes: u64) {
-        self.0.shared.grants.give_back(Account::Factor, bytes);
+        self.in_flight.shared.grants.give_back(Account::Factor, bytes);
+    }
+
+    /// Other threads help as soon as there are places for them. They end when no task is left; a panic of theirs is one of this thread.
+    fn together(&self, tasks: Vec<Task<'_>>) {
+        let Self { in_flight, stage } = *self;
+        let InFlight { shared, turn, settings, .. } = in_flight;
+        let helpers = settings.jobs.min(tasks.len()).saturating_sub(1);
+        if helpers == 0 {
+            return one_by_one(tasks, self);
+        }
+        let tasks = Mutex::new(VecDeque::from(tasks));
+        let next = || tasks.lock().pop_front();
+        let help = || {
+            let no_more = |permit: &Permit| {
+                while let Some(task) = next() {
+                    task(permit)
+                }
+            };
+            in_flight.inside(stage, no_more);
+        };
+        let helped = std::thread::scope(|scope| {
+            // Where the system has no thread, nobody helps.
+            let helpers: Vec<_> = (0..helpers)
+                .filter_map(|_| {
+                    std::thread::Builder::new().name(stage.name().to_owned()).spawn_scoped(scope, help).ok()
+                })
+                .collect();
+            let own = catch_unwind(AssertUnwindSafe(|| {
+                while let Some(task) = next() {
+                    task(self)
+                }
+            }));
+            // Nobody waits for others while it holds a place.
+            shared.grants.leave();
+            let of_helpers: Vec<_> = helpers.into_iter().map(|helper| helper.join()).collect();
+            shared.grants.enter(*turn);
+            of_helpers.into_iter().fold(own, Result::and)
+        });
+        if let Err(panic) = helped {
+            resume_unwind(panic);
+        }
     }
 }
 

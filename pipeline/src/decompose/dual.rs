@@ -43,6 +43,12 @@ pub(super) struct Dual<'a> {
     angles: Vec<f64>,
 }
 
+/// The features of a surface: the fields of [`Dual`] of these names.
+pub(super) struct Features {
+    sharpness: Vec<f64>,
+    is_kept: Vec<bool>,
+}
+
 impl<'a> Dual<'a> {
     pub(super) fn new(mesh: &'a SurfaceMesh, monitor: &'a dyn Monitor) -> Self {
         let scale = mesh.metric().scale;
@@ -72,6 +78,30 @@ impl<'a> Dual<'a> {
         };
         made.coincident_faces = made.find_coincident_faces();
         made.steps = made.half_edges().map(|h| made.step(h)).collect();
+        made
+    }
+
+    /// The features that were marked.
+    pub(super) fn into_features(self) -> Features {
+        let Self { sharpness, is_kept, .. } = self;
+        Features { sharpness, is_kept }
+    }
+
+    /// A part of the surface `whole`, which consists of these faces of it, with the features that were marked there.
+    pub(super) fn of_part(
+        part: &'a SurfaceMesh,
+        faces: &[FaceId],
+        whole: &SurfaceMesh,
+        features: &Features,
+        monitor: &'a dyn Monitor,
+    ) -> Self {
+        let mut made = Self::new(part, monitor);
+        for (local, face) in faces.iter().enumerate() {
+            made.is_kept[local] = features.is_kept[face.index()];
+            for (h, there) in FaceId::at(local).sides().into_iter().zip(face.sides()) {
+                made.sharpness[part.edges().edge(h).index()] = features.sharpness[whole.edges().edge(there).index()];
+            }
+        }
         made
     }
 

@@ -14,7 +14,7 @@ use super::regions::Regions;
 use super::voronoi::{Cells, bisect_until, farthest_first};
 use super::{Error, Settings, cells, finish};
 use crate::atlas::Chart;
-use crate::mesh::SurfaceMesh;
+use crate::mesh::{SurfaceMesh, vertices_of};
 use crate::monitor::{Interrupted, Monitor};
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 
@@ -128,15 +128,10 @@ fn largest_parts(dual: &Dual, is_left: &[bool]) -> Vec<u32> {
 pub(crate) fn part_of(chart: &Chart, surface: &SurfaceMesh, faces: &[FaceId]) -> Option<Chart> {
     let part = surface.restricted(faces);
     let piece = assemble(&part, &vec![0; faces.len()]).ok()?.into_charts().pop()?;
-    let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| chart.triangles[f.index()]).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
-    Some(Chart {
-        id: chart.id,
-        vertices: vertices.iter().map(|v| chart.vertices[v.index()]).collect(),
-        faces: faces.iter().map(|f| chart.faces[f.index()]).collect(),
-        ..piece
-    })
+    let vertices: Vec<VertexId> =
+        vertices_of(&chart.triangles, faces).into_iter().map(|v| chart.vertices[v.index()]).collect();
+    let faces: Vec<FaceId> = faces.iter().map(|f| chart.faces[f.index()]).collect();
+    Some(piece.on_surface(chart.id, &vertices, &faces))
 }
 
 /// The charts into which `cut` labels the triangles of `chart`, with straightened seams.
@@ -154,13 +149,8 @@ fn pieces(
     let size = dual.total_area() / cells.len as f64;
     let pieces = finish(&dual, labels, limits, settings, &cells, |_| size.sqrt())?;
     dual.checkpoint.end()?;
-    let on_surface = |piece: &Chart| Chart {
-        id: chart.id,
-        vertices: piece.vertices.iter().map(|v| chart.vertices[v.index()]).collect(),
-        faces: piece.faces.iter().map(|f| chart.faces[f.index()]).collect(),
-        ..piece.clone()
-    };
-    Ok(pieces.charts().iter().map(on_surface).collect())
+    let on_surface = |piece: Chart| piece.on_surface(chart.id, &chart.vertices, &chart.faces);
+    Ok(pieces.into_charts().into_iter().map(on_surface).collect())
 }
 
 /// Gives triangles with the label `none` that of the nearest with another one, counted in triangles, as far as they are connected to

@@ -204,9 +204,7 @@ impl SurfaceMesh {
     /// still to be counted ([`Self::of_sheets`]).
     pub(crate) fn restricted(&self, faces: &[FaceId]) -> Self {
         // What it costs depends on the part alone.
-        let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| self.triangles[f.index()]).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
+        let vertices = vertices_of(&self.triangles, faces);
         let number = |v: VertexId| VertexId::at(vertices.partition_point(|w| *w < v));
         let triangles = faces.iter().map(|f| self.triangles[f.index()].map(number)).collect();
         let local = |f: FaceId| faces.binary_search(&f).ok().map(FaceId::at);
@@ -265,6 +263,14 @@ impl SurfaceMesh {
         let origin = BoundingBox { min: [0.0; 3], max: [0.0; 3] };
         BoundingBox::of(self.points.iter().copied()).unwrap_or(origin)
     }
+}
+
+/// The vertices of some triangles, ascending.
+pub(crate) fn vertices_of(triangles: &[[VertexId; 3]], faces: &[FaceId]) -> Vec<VertexId> {
+    let mut vertices: Vec<VertexId> = faces.iter().flat_map(|f| triangles[f.index()]).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    vertices
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@
 //! Cutting is no end in itself: more charts mean more curves on which the nodes of a mesh are bound to lie. A cut is
 //! tried, and taken only where all parts suit a mesher and are few.
 
+use super::divided::{Piece, divided};
 use super::job::{ChartError, MapError, Maps, map_whole};
 use super::join::joined;
 use crate::atlas::Chart;
@@ -90,6 +91,7 @@ const PEELED: f64 = 0.875;
 pub(super) type Mapped = (Chart, Maps);
 
 /// What cutting needs to know beside the chart.
+#[derive(Clone, Copy)]
 pub(super) struct Cutter<'a> {
     pub(super) settings: &'a ChartSettings,
     pub(super) monitor: &'a dyn Monitor,
@@ -118,7 +120,7 @@ impl Cutter<'_> {
     ///
     /// # Errors
     /// [`ChartError`].
-    pub(super) fn parts(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Mapped>>, ChartError> {
+    fn parts(&self, chart: &Chart, map: &Maps) -> Result<Option<Vec<Mapped>>, ChartError> {
         if let Some(strips) = self.strips(chart, map)? {
             return Ok(Some(strips));
         }
@@ -207,35 +209,56 @@ impl Cutter<'_> {
         bound: f64,
         most: usize,
     ) -> Result<Option<(Vec<Mapped>, usize)>, ChartError> {
-        let (mut done, mut naturals) = (Vec::new(), 0);
         let Some(parts) = self.halves(chart, map, false)? else { return Ok(None) };
-        let mut waiting = marked(chart, parts);
-        while let Some((part, is_peeled)) = waiting.pop() {
-            if done.len() + waiting.len() + 1 > most {
-                return Ok(None);
-            }
-            let map = match self.attempt(&part)? {
-                Attempt::Mapped(map) => map,
-                Attempt::Split(parts) => {
-                    waiting.extend(marked(&part, parts));
-                    continue;
-                }
-                // Left to the caller's rule for charts that do not map.
-                Attempt::Single => return Ok(None),
-            };
-            let suits = self.suits(&part, map.boundary, map.conformal_p99(&part), bound)?;
-            let parts = if suits == Suits::Neither { self.halves(&part, &map, is_peeled)? } else { None };
-            match parts {
-                // Nothing becomes smaller.
-                Some(parts) if parts.len() < 2 => return Ok(None),
-                Some(parts) => waiting.extend(marked(&part, parts)),
-                None => {
-                    naturals += usize::from(suits == Suits::Natural);
-                    done.push((part, *map));
-                }
-            }
-        }
-        Ok(Some((done, naturals)))
+        let few = |parts| if parts > most { Err(Stopped::Hopeless) } else { Ok(()) };
+        let look = |(part, is_peeled): Marked, monitor: &dyn Monitor| {
+            let cutter = Cutter { monitor, ..*self };
+            cutter.look(part, is_peeled, bound)
+        };
+        let parts = match divided(marked(chart, parts), self.monitor, few, look) {
+            Ok(parts) => parts,
+            Err(Stopped::Hopeless) => return Ok(None),
+            Err(Stopped::Failed(error)) => return Err(error),
+        };
+        let naturals = parts.iter().filter(|(_, suits)| *suits == Suits::Natural).count();
+        Ok(Some((parts.into_iter().rev().map(|(mapped, _)| mapped).collect(), naturals)))
+    }
+
+    /// What becomes of a part: its map stretches less than `bound` or is natural, or it is cut again.
+    fn look(&self, part: Chart, is_peeled: bool, bound: f64) -> Result<Piece<Marked, (Mapped, Suits)>, Stopped> {
+        let map = match self.attempt(&part)? {
+            Attempt::Mapped(map) => map,
+            Attempt::Split(parts) => return Ok(Piece::Divided(marked(&part, parts))),
+            // Left to the caller's rule for charts that do not map.
+            Attempt::Single => return Err(Stopped::Hopeless),
+        };
+        let suits = self.suits(&part, map.boundary, map.conformal_p99(&part), bound)?;
+        let parts = if suits == Suits::Neither { self.halves(&part, &map, is_peeled)? } else { None };
+        Ok(match parts {
+            // Nothing becomes smaller.
+            Some(parts) if parts.len() < 2 => return Err(Stopped::Hopeless),
+            Some(parts) => Piece::Divided(marked(&part, parts)),
+            None => Piece::Done(((part, *map), suits)),
+        })
+    }
+
+    /// The parts into which a chart is to be cut ([`Self::parts`]), or the chart with its map.
+    ///
+    /// # Errors
+    /// [`ChartError`].
+    pub(super) fn whole_or_parts(&self, chart: Chart, map: Maps) -> Result<Vec<Mapped>, ChartError> {
+        let parts = self.parts(&chart, &map)?;
+        Ok(parts.unwrap_or_else(|| vec![(chart, map)]))
+    }
+
+    /// A single triangle: its map is what it is.
+    ///
+    /// # Errors
+    /// [`ChartError`].
+    pub(super) fn single(&self, chart: Chart) -> Result<Vec<Mapped>, ChartError> {
+        let ChartSettings { order, ref decompose, .. } = *self.settings;
+        let map = map_whole(&chart, order, decompose.boundary, f64::INFINITY, self.monitor)?;
+        Ok(vec![(chart, map)])
     }
 
     /// Maps a chart, or splits it once where it touches itself in space, cannot be mapped, or would be too distorted.
@@ -319,8 +342,24 @@ impl Large {
     }
 }
 
-/// The parts of `chart`, each with whether little more than a peel was taken off it.
-fn marked(chart: &Chart, parts: Vec<Chart>) -> Vec<(Chart, bool)> {
+/// Why there are no parts that suit a mesher.
+enum Stopped {
+    /// They are too many, or one of them never will.
+    Hopeless,
+    Failed(ChartError),
+}
+
+impl<E: Into<ChartError>> From<E> for Stopped {
+    fn from(error: E) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+/// A part of a chart, and whether little more than a peel was taken off it.
+type Marked = (Chart, bool);
+
+/// The parts of `chart`.
+fn marked(chart: &Chart, parts: Vec<Chart>) -> Vec<Marked> {
     let large = PEELED * chart.triangles().len() as f64;
     let mark = |part: Chart| {
         let is_peeled = part.triangles().len() as f64 > large;

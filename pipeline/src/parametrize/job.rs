@@ -1,6 +1,7 @@
 //! One chart through the stages: linear map, quadratic map, untangling, certificate.
 
-use super::cut::{Attempt, Cutter};
+use super::cut::{Attempt, Cutter, Mapped};
+use super::divided::{Piece, Triangles, divided};
 use super::join::joined;
 use crate::atlas::Chart;
 use crate::certified::{BoundaryFound, CertifiedChart, Harmonic, LinearSummary, Provenance};
@@ -17,7 +18,7 @@ use crate::map::natural::{
 use crate::map::quadratic::{QuadraticMap, min_det, quadratic_map};
 use crate::measure::distortion;
 use crate::mesh::TriangleShape;
-use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
+use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor, try_each};
 use crate::refine;
 use crate::settings::{BoundaryShape, ChartSettings, Order, OutOfRange};
 use crate::topology::FaceId;
@@ -232,44 +233,36 @@ impl ChartJob {
                 Err(_) => Self::new(chart, settings).mapped_parts(monitor)?,
             },
         };
-        let mut mapped = Vec::with_capacity(parts.len());
-        for (chart, maps) in parts {
-            let mapped_parts = freed_or_cut(chart, &settings, maps, monitor)?;
-            mapped.extend(mapped_parts.into_iter().map(|(chart, maps)| MappedChart { chart, settings, maps }));
-        }
-        Ok(mapped)
+        let triangles = parts.iter().map(Triangles::triangles).sum();
+        let freed = |(chart, maps), monitor: &dyn Monitor| freed_or_cut(chart, &settings, maps, monitor);
+        let found = try_each(monitor, parts, triangles, freed)?;
+        let mapped = |(chart, maps)| MappedChart { chart, settings, maps };
+        Ok(found.into_iter().flatten().map(mapped).collect())
     }
 
     /// The chart with its maps, or its parts with theirs, before any of them is freed from the disk.
-    pub(super) fn mapped_parts(self, monitor: &dyn Monitor) -> Result<Vec<(Chart, Maps)>, ChartError> {
+    pub(super) fn mapped_parts(self, monitor: &dyn Monitor) -> Result<Vec<Mapped>, ChartError> {
         let settings = self.settings;
         settings.check()?;
         let cutter = Cutter { settings: &settings, monitor };
-        let mut mapped = Vec::new();
-        // The chart itself, once it is split: it is the first that is looked at.
-        let mut whole = None;
-        let mut waiting = vec![self.chart];
-        while let Some(chart) = waiting.pop() {
-            match cutter.attempt(&chart)? {
-                Attempt::Mapped(maps) => match cutter.parts(&chart, &maps)? {
-                    Some(parts) => mapped.extend(parts),
-                    None => mapped.push((chart, *maps)),
-                },
-                Attempt::Split(parts) => {
-                    whole.get_or_insert(chart);
-                    waiting.extend(parts.into_iter().rev());
-                }
-                // Its map is what it is.
-                Attempt::Single => {
-                    let maps = map_whole(&chart, settings.order, settings.decompose.boundary, f64::INFINITY, monitor)?;
-                    mapped.push((chart, maps));
-                }
-            }
-        }
+        let parts = match cutter.attempt(&self.chart)? {
+            Attempt::Mapped(maps) => return cutter.whole_or_parts(self.chart, *maps),
+            Attempt::Single => return cutter.single(self.chart),
+            Attempt::Split(parts) => parts,
+        };
+        let look = |part: Chart, monitor: &dyn Monitor| {
+            let cutter = Cutter { monitor, ..cutter };
+            Ok::<_, ChartError>(match cutter.attempt(&part)? {
+                Attempt::Mapped(maps) => Piece::Done(cutter.whole_or_parts(part, *maps)?),
+                Attempt::Single => Piece::Done(cutter.single(part)?),
+                Attempt::Split(parts) => Piece::Divided(parts),
+            })
+        };
+        let mapped = divided(parts, monitor, |_| Ok(()), look)?.into_iter().flatten().collect();
         // Joined parts have natural boundaries.
-        match whole.filter(|_| settings.decompose.boundary == BoundaryShape::Natural) {
-            Some(whole) => joined(&cutter, &whole, mapped),
-            None => Ok(mapped),
+        match settings.decompose.boundary {
+            BoundaryShape::Natural => joined(&cutter, &self.chart, mapped),
+            BoundaryShape::Circle => Ok(mapped),
         }
     }
 
@@ -472,11 +465,12 @@ pub(super) fn freed_or_cut(
     let Some(parts) = (Cutter { settings, monitor }).parts_of_large(&chart, &maps)? else {
         return Ok(vec![(chart, maps)]);
     };
-    let freed = |(chart, maps): (Chart, Maps)| {
+    let freed = |(chart, maps): Mapped, monitor: &dyn Monitor| {
         let maps = freed_where_stretched(&chart, settings, maps, monitor)?;
         Ok((chart, maps))
     };
-    parts.into_iter().map(freed).collect()
+    let triangles = parts.iter().map(Triangles::triangles).sum();
+    try_each(monitor, parts, triangles, freed)
 }
 
 /// The maps of a chart with another boundary, where that stretches less. Those on the circle for want of a natural one get a

@@ -9,6 +9,7 @@
 //! 5. [`CertifiedAtlas::gather`] puts the charts together, and finds the curves between them.
 
 mod cut;
+mod divided;
 mod job;
 mod join;
 mod survey;

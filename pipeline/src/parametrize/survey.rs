@@ -5,13 +5,15 @@
 //! there once: charts meet in the same nodes. Chart jobs are cut from the refined surface; maps of charts that came out
 //! as they were by themselves are kept, and so are those of charts that stayed as they are.
 
+use super::cut::Mapped;
+use super::divided::Triangles;
 use super::job::{ChartError, ChartJob, MapError, MappedChart, Maps, finer_maps, freed_or_cut};
 use crate::atlas::Chart;
 use crate::certified::BoundaryFound;
 use crate::decompose::{self, Illegal, assemble, with_outer};
 use crate::grid::GridPoint;
 use crate::mesh::SurfaceMesh;
-use crate::monitor::Monitor;
+use crate::monitor::{Monitor, try_each};
 use crate::refine::POOR;
 use crate::refine::bisect::{Ends, Refined, Step};
 use crate::settings::Order;
@@ -95,24 +97,26 @@ impl ChartJob {
     /// [`ChartError`].
     pub fn survey(self, monitor: &dyn Monitor) -> Result<Surveyed, ChartError> {
         let settings = self.settings;
-        let mut parts = Vec::new();
-        for (chart, maps) in self.mapped_parts(monitor)? {
+        let of_part = |(chart, maps): Mapped, monitor: &dyn Monitor| {
             let mapped = MappedChart { chart, settings, maps };
             let finer_one = finer(&mapped, monitor)?;
             if finer_one.is_some() {
-                parts.push(Part { mapped, finer: finer_one });
-                continue;
+                return Ok(vec![Part { mapped, finer: finer_one }]);
             }
             let found = freed_or_cut(mapped.chart, &settings, mapped.maps, monitor)?;
             // The whole has been looked at.
             let are_parts = found.len() > 1;
-            for (chart, maps) in found {
+            let part = |(chart, maps)| {
                 let mapped = MappedChart { chart, settings, maps };
                 let finer = if are_parts { finer(&mapped, monitor)? } else { None };
-                parts.push(Part { mapped, finer });
-            }
-        }
-        Ok(Surveyed { parts })
+                Ok(Part { mapped, finer })
+            };
+            found.into_iter().map(part).collect::<Result<Vec<Part>, ChartError>>()
+        };
+        let mapped = self.mapped_parts(monitor)?;
+        let triangles = mapped.iter().map(Triangles::triangles).sum();
+        let parts = try_each(monitor, mapped, triangles, of_part)?;
+        Ok(Surveyed { parts: parts.into_iter().flatten().collect() })
     }
 }
 

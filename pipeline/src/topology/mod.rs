@@ -20,5 +20,5 @@ pub use edges::EdgeTable;
 pub use id::{ChartId, CurveId, EdgeId, FaceId, HalfEdgeId, VertexId};
 pub use stars::Stars;
 pub use summary::{TopologySummary, VertexFans};
-pub(crate) use summary::{count_components, orientation};
+pub(crate) use summary::{components, count_components, orientation};
 pub(crate) use visits::VisitStamps;

@@ -216,13 +216,27 @@ fn count_vertices(fan_vertices: &[VertexId]) -> (usize, usize) {
 
 /// The number of parts connected through edges.
 pub(crate) fn count_components(faces: usize, edges: &EdgeTable) -> usize {
+    connected(faces, edges).labels().1
+}
+
+/// The faces of each part connected through edges, ascending; parts in the order of their first faces.
+pub(crate) fn components(faces: usize, edges: &EdgeTable) -> Vec<Vec<FaceId>> {
+    let (labels, count) = connected(faces, edges).labels();
+    let mut components = vec![Vec::new(); count];
+    for (face, label) in labels.into_iter().enumerate() {
+        components[label as usize].push(FaceId::at(face));
+    }
+    components
+}
+
+fn connected(faces: usize, edges: &EdgeTable) -> UnionFind {
     let mut sets = UnionFind::new(faces);
     for (_, sides) in edges.iter() {
         for pair in sides.windows(2) {
             sets.merge(pair[0].face().index(), pair[1].face().index());
         }
     }
-    sets.labels().1
+    sets
 }
 
 /// Boundary edges that end in the same fan belong to the same loop.

@@ -4,7 +4,7 @@ use crate::map::boundary::{Boundary, Mids};
 use crate::map::linear::{flatten_ear_arcs, linear_map};
 use crate::map::quadratic::{energy, quadratic_map};
 use crate::mesh::TriangleSoup;
-use crate::monitor::NoMonitor;
+use crate::monitor::{NoMonitor, Task, one_by_one};
 use crate::{decompose, repair, shapes};
 
 /// A chart with its feasible start and its harmonic map.
@@ -226,4 +226,8 @@ impl Monitor for CountDown {
     fn reserve(&self, _bytes: u64) {}
 
     fn release(&self, _bytes: u64) {}
+
+    fn together(&self, tasks: Vec<Task<'_>>) {
+        one_by_one(tasks, self);
+    }
 }
