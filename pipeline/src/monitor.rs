@@ -325,6 +325,53 @@ mod tests {
         }
     }
 
+    /// Does tasks from the last to the first.
+    struct Backwards;
+
+    impl Monitor for Backwards {
+        fn should_continue(&self) -> bool {
+            true
+        }
+
+        fn reserve(&self, _bytes: u64) {}
+
+        fn release(&self, _bytes: u64) {}
+
+        fn together(&self, tasks: Vec<Task<'_>>) {
+            one_by_one(tasks.into_iter().rev().collect(), self);
+        }
+    }
+
+    #[test]
+    fn what_comes_out_does_not_depend_on_the_order_in_which_tasks_are_done() {
+        let apart =
+            |soup: &TriangleSoup, by: f64| soup.points().iter().map(|p| [p[0] + by, p[1], p[2]]).collect::<Vec<_>>();
+        // Two components; and one chart that falls into many parts.
+        let torus = shapes::ring_torus(60, 32);
+        let beyond = torus.triangles().iter().map(|t| t.map(|v| v + torus.points().len() as u32));
+        let triangles = torus.triangles().iter().copied().chain(beyond).collect();
+        let tori = TriangleSoup::new([apart(&torus, 0.0), apart(&torus, 100.0)].concat(), triangles).expect("sound");
+        let fine = decompose::Settings { max_area_ratio: 30.0, feature_angle: None, ..Default::default() };
+        let split = Settings { decompose: fine, ..Settings::default() };
+        for (soup, settings) in [(tori, Settings::default()), (shapes::bent_disk(40, 0.45, 1.0), split)] {
+            let mesh = surface(&soup);
+            let forwards = maps(&mesh, &settings, &NoMonitor).expect("maps");
+            assert!(forwards.len() > 2 && forwards == maps(&mesh, &settings, &Backwards).expect("maps"));
+        }
+    }
+
+    #[test]
+    fn the_first_failure_is_told_and_nothing_is_begun_behind_it() {
+        let begun = AtomicUsize::new(0);
+        let work = |number: usize, _: &dyn Monitor| {
+            begun.fetch_add(1, Relaxed);
+            if number % 3 == 2 { Err(number) } else { Ok(10 * number) }
+        };
+        assert_eq!(try_each(&NoMonitor, vec![0, 1, 3, 4], LITTLE, work), Ok(vec![0, 10, 30, 40]));
+        assert_eq!(try_each(&NoMonitor, (0..9).collect(), LITTLE, work), Err(2));
+        assert_eq!(begun.into_inner(), 4 + 3);
+    }
+
     #[test]
     fn a_factor_holds_its_memory_until_it_is_dropped() {
         let spring = [[1.0, -1.0], [-1.0, 1.0]];

@@ -343,15 +343,21 @@ pub(super) mod tests {
 
     /// What threads share, with an output folder that goes with it.
     pub fn shared(memory: u64) -> (Arc<Shared>, Receiver<Completion>, tempfile::TempDir) {
+        shared_by(1, memory)
+    }
+
+    /// The same with so many places to compute.
+    fn shared_by(jobs: usize, memory: u64) -> (Arc<Shared>, Receiver<Completion>, tempfile::TempDir) {
+        let settings = RawSettings { jobs: Some(jobs), ..RawSettings::default() };
         let out = tempfile::tempdir().expect("a folder");
         let (ended, to_tell) = bounded(8);
         let shared = Shared {
-            settings: RwLock::new(Arc::new(RawSettings::default().check().expect("in range"))),
+            settings: RwLock::new(Arc::new(settings.check().expect("in range"))),
             sink: Sink::Out(Arc::new(Publisher::open(out.path()).expect("opens"))),
             begun: None,
             is_patient: false,
             queue: Queue::default(),
-            grants: Arc::new(Own::new(1, memory)),
+            grants: Arc::new(Own::new(jobs, memory)),
             progress: Progress::default(),
             ended,
             steps: AtomicU64::new(0),
@@ -424,5 +430,41 @@ pub(super) mod tests {
             }
         };
         std::thread::scope(|s| travels.each_ref().map(|t| s.spawn(|| rounds(t))).map(|t| t.join().expect("ends")));
+    }
+
+    #[test]
+    fn tasks_are_done_at_the_same_time_where_there_are_places_and_a_panic_in_one_fails_the_job() {
+        let (shared, _ended, _out) = shared_by(2, 1 << 20);
+        let in_flight = begin(&shared);
+        let both = std::sync::Barrier::new(2);
+        let meet = || -> Task<'_> {
+            Box::new(|monitor| {
+                assert!(monitor.should_continue());
+                both.wait();
+            })
+        };
+        // They wait for each other.
+        assert_eq!(in_flight.compute(Stage::Map, |monitor| Ok(monitor.together(vec![meet(), meet()]))), Ok(()));
+        let broken = in_flight.compute(Stage::Map, |monitor| {
+            monitor.together(vec![Box::new(|_| ()), Box::new(|_| panic!("a fault, for the test")), Box::new(|_| ())]);
+            Ok(())
+        });
+        assert!(matches!(broken, Err(Abort::For(reason)) if reason.code == Code::Internal));
+        // Nobody is left who holds a place.
+        assert_eq!(in_flight.compute(Stage::Map, |monitor| Ok(monitor.together(vec![meet(), meet()]))), Ok(()));
+    }
+
+    #[test]
+    fn with_one_place_tasks_are_done_by_who_has_it_in_their_order() {
+        let (shared, _ended, _out) = shared(1 << 20);
+        let in_flight = begin(&shared);
+        let done = Mutex::new(Vec::new());
+        let task = |number: usize| -> Task<'_> {
+            let done = &done;
+            Box::new(move |_| done.lock().push((number, std::thread::current().id())))
+        };
+        assert_eq!(in_flight.compute(Stage::Map, |monitor| Ok(monitor.together((0..9).map(task).collect()))), Ok(()));
+        let here = std::thread::current().id();
+        assert_eq!(done.into_inner(), (0..9).map(|number| (number, here)).collect::<Vec<_>>());
     }
 }

@@ -365,3 +365,33 @@ fn small_faces_are_kept_where_they_are_flat() {
     let charts = |uneven: f64| atlas(&with_small_cube(uneven), &Settings::default()).charts().len();
     assert_eq!((charts(0.0), charts(0.1)), (6, 1));
 }
+
+/// Two soups as one.
+fn beside(a: &TriangleSoup, b: &TriangleSoup) -> TriangleSoup {
+    let renumbered = b.triangles().iter().map(|t| t.map(|v| v + a.points().len() as u32));
+    let triangles = a.triangles().iter().copied().chain(renumbered).collect();
+    TriangleSoup::new([a.points(), b.points()].concat(), triangles).expect("sound")
+}
+
+#[test]
+fn a_component_is_decomposed_as_if_it_were_alone() {
+    let (torus, tube) = (shapes::ring_torus(30, 16), tube(24, 80));
+    let moved = tube.points().iter().map(|p| [p[0] + 100.0, p[1], p[2]]).collect();
+    let tube = TriangleSoup::new(moved, tube.triangles().to_vec()).expect("sound");
+    // Per chart its triangles, where `before` others come first.
+    let faces = |soup: &TriangleSoup, before: usize| -> Vec<Vec<usize>> {
+        let faces = |chart: &Chart| chart.faces().iter().map(|f| f.index() + before).collect();
+        atlas(soup, &smooth()).charts().iter().map(faces).collect()
+    };
+    let alone = [faces(&torus, 0), faces(&tube, torus.triangles().len())].concat();
+    let together = beside(&torus, &tube);
+    assert_eq!(faces(&together, 0), alone);
+    // They are numbered in the order of their first triangles, and hold the vertices of the surface.
+    let (mesh, atlas) = (surface(&together), atlas(&together, &smooth()));
+    for (chart, id) in atlas.charts().iter().zip(0..) {
+        assert_eq!(chart.id(), ChartId(id));
+        for (t, face) in chart.triangles().iter().zip(chart.faces()) {
+            assert_eq!(t.map(|v| chart.vertices()[v.index()]), mesh.triangles()[face.index()]);
+        }
+    }
+}
