@@ -268,25 +268,66 @@ struct Soup {
     soup: TriangleSoup,
 }
 
-/// What refinement gets.
-struct Uncharted {
-    surface: Arc<Surface<Surveyed>>,
-    index: usize,
-    job: ChartJob,
+/// Charts that travel together: one large one, or small ones until they have [`TOGETHER`] triangles.
+struct Charts<T, R> {
+    surface: Arc<Surface<R>>,
+    charts: Vec<(PartIndex, T)>,
 }
+
+/// What refinement gets.
+type Uncharted = Charts<ChartJob, Surveyed>;
 
 /// What mapping gets.
-struct Cut {
-    surface: Arc<Surface<Vec<CertifiedChart>>>,
-    part_index: PartIndex,
-    job: ChartJob,
-}
+type Cut = Charts<ChartJob, Vec<CertifiedChart>>;
 
 /// What untangling gets.
-struct Mapped {
-    surface: Arc<Surface<Vec<CertifiedChart>>>,
-    part_index: PartIndex,
-    mapped: MappedChart,
+type Mapped = Charts<MappedChart, Vec<CertifiedChart>>;
+
+/// Each chart by itself would wait for a place to compute, three times: menger_sponge3 has 7,000 of nine triangles each.
+const TOGETHER: usize = 1_000;
+
+impl<T, R> Charts<T, R> {
+    /// Hands charts of a surface on, each with its place among them.
+    fn hand_on(
+        surface: &Arc<Surface<R>>,
+        charts: impl IntoIterator<Item = (PartIndex, T)>,
+        triangles: impl Fn(&T) -> usize,
+        to: &Sender<Self>,
+    ) {
+        let (mut together, mut room) = (Vec::new(), 0);
+        for (part_index, chart) in charts {
+            let count = triangles(&chart);
+            if !together.is_empty() && count > room {
+                hand_on(to, Self { surface: surface.clone(), charts: std::mem::take(&mut together) });
+            }
+            if together.is_empty() {
+                room = TOGETHER;
+            }
+            room = room.saturating_sub(count);
+            together.push((part_index, chart));
+        }
+        if !together.is_empty() {
+            hand_on(to, Self { surface: surface.clone(), charts: together });
+        }
+    }
+
+    /// Does the work of a stage on each of them that is still wanted.
+    fn compute<S>(
+        self,
+        stage: Stage,
+        work: impl Fn(T, &dyn Monitor) -> Result<S, Abort>,
+    ) -> Vec<(PartIndex, Result<S, Abort>)> {
+        let Self { surface, charts } = self;
+        let part_indices: Vec<PartIndex> = charts.iter().map(|(part_index, _)| *part_index).collect();
+        let found = surface.in_flight.compute(stage, |monitor| {
+            let of_chart = |(part_index, chart)| {
+                let is_pending = surface.is_pending(part_index);
+                (part_index, if is_pending { work(chart, monitor) } else { Err(Abort::Unwanted) })
+            };
+            Ok(charts.into_iter().map(of_chart).collect())
+        });
+        found.unwrap_or_else(|why| part_indices.into_iter().map(|index| (index, Err(why.clone()))).collect())
+    }
 }
 
 /// What writing gets.
@@ -330,22 +371,28 @@ fn cut(Soup { in_flight, mut facts, soup }: Soup, charts: &Sender<Uncharted>, fi
         Ok(Plan { mesh, jobs, .. }) => {
             let surface = Surface::new(in_flight, mesh, jobs.len(), jobs.len(), facts);
             // The stages behind work on the first charts while the last ones wait here for room in the channel.
-            for (index, job) in jobs.into_iter().enumerate() {
-                hand_on(charts, Uncharted { surface: surface.clone(), index, job });
-            }
+            Charts::hand_on(&surface, numbered(jobs), triangles_of_job, charts);
         }
     }
 }
 
-/// Looks at a chart; behind the last one of a surface, refines that, and sends its charts on.
-fn survey(Uncharted { surface, index, job }: Uncharted, charts: &Sender<Cut>, finished: &Sender<Finished>) {
-    let in_flight = surface.in_flight.clone();
-    let work = |monitor: &dyn Monitor| stages::survey(job, monitor);
-    let part_index = (index, 0);
-    let found = if surface.is_pending(part_index) { in_flight.compute(Stage::Map, work) } else { Err(Abort::Unwanted) };
-    if !surface.complete_part(part_index, found) {
+/// Charts with their places.
+fn numbered(jobs: Vec<ChartJob>) -> impl Iterator<Item = (PartIndex, ChartJob)> {
+    jobs.into_iter().enumerate().map(|(number, job)| ((number, 0), job))
+}
+
+fn triangles_of_job(job: &ChartJob) -> usize {
+    job.chart.triangles().len()
+}
+
+/// Looks at charts; behind the last one of a surface, refines that, and sends its charts on.
+fn survey(uncharted: Uncharted, charts: &Sender<Cut>, finished: &Sender<Finished>) {
+    let surface = uncharted.surface.clone();
+    let found = uncharted.compute(Stage::Map, stages::survey);
+    if !surface.complete_parts(found) {
         return;
     }
+    let in_flight = surface.in_flight.clone();
     let (mut facts, surveyed) = surface.collect();
     let refined = surveyed.and_then(|(mesh, surveyed)| {
         in_flight.compute(Stage::Refine, |_| {
@@ -360,47 +407,44 @@ fn survey(Uncharted { surface, index, job }: Uncharted, charts: &Sender<Cut>, fi
         Err(why) => hand_on(finished, Finished::Abort(in_flight, Box::new(facts), why)),
         Ok((mesh, jobs)) => {
             let surface = Surface::new(in_flight, mesh, surface.whole, jobs.len(), facts);
-            for (i, job) in jobs.into_iter().enumerate() {
-                hand_on(charts, Cut { surface: surface.clone(), part_index: (i, 0), job });
-            }
+            Charts::hand_on(&surface, numbered(jobs), triangles_of_job, charts);
         }
     }
 }
 
-fn map(Cut { surface, part_index, job }: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
-    let in_flight = &surface.in_flight;
-    let work = |monitor: &dyn Monitor| stages::map(job, monitor);
-    let parts = if surface.is_pending(part_index) { in_flight.compute(Stage::Map, work) } else { Err(Abort::Unwanted) };
-    match parts {
-        Err(why) => complete_part(surface, part_index, Err(why), finished),
-        Ok(parts) => {
-            // Before the first of them travels on: the surface must not be taken for complete.
-            surface.expect(parts.len() - 1);
-            for (k, mapped) in parts.into_iter().enumerate() {
-                hand_on(untangle, Mapped { surface: surface.clone(), part_index: (part_index.0, k), mapped });
+fn map(cut: Cut, untangle: &Sender<Mapped>, finished: &Sender<Finished>) {
+    let surface = cut.surface.clone();
+    let (mut mapped, mut stopped, mut charts) = (Vec::new(), Vec::new(), 0);
+    for (part_index, parts) in cut.compute(Stage::Map, stages::map) {
+        match parts {
+            Err(why) => stopped.push((part_index, Err(why))),
+            Ok(parts) => {
+                charts += 1;
+                mapped.extend(parts.into_iter().enumerate().map(|(k, part)| ((part_index.0, k), part)));
             }
         }
     }
+    // Before the first of them travels on: the surface must not be taken for complete.
+    surface.expect(mapped.len() - charts);
+    complete_parts(&surface, stopped, finished);
+    Charts::hand_on(&surface, mapped, |mapped| mapped.chart().triangles().len(), untangle);
 }
 
-fn untangle(Mapped { surface, part_index, mapped }: Mapped, finished: &Sender<Finished>) {
-    let in_flight = &surface.in_flight;
-    let work = |monitor: &dyn Monitor| stages::untangle(mapped, monitor);
-    let part =
-        if surface.is_pending(part_index) { in_flight.compute(Stage::Untangle, work) } else { Err(Abort::Unwanted) };
-    complete_part(surface, part_index, part, finished);
+fn untangle(mapped: Mapped, finished: &Sender<Finished>) {
+    let surface = mapped.surface.clone();
+    let parts = mapped.compute(Stage::Untangle, stages::untangle);
+    complete_parts(&surface, parts, finished);
 }
 
-fn complete_part(
-    surface: Arc<Surface<Vec<CertifiedChart>>>,
-    part_index: PartIndex,
-    part: Result<Vec<CertifiedChart>, Abort>,
+fn complete_parts(
+    surface: &Arc<Surface<Vec<CertifiedChart>>>,
+    parts: Vec<(PartIndex, Result<Vec<CertifiedChart>, Abort>)>,
     finished: &Sender<Finished>,
 ) {
     let in_flight = &surface.in_flight;
-    in_flight.shared.progress.update(in_flight.number, |job| job.charts_done += 1);
-    if surface.complete_part(part_index, part) {
-        hand_on(finished, Finished::Surface(surface));
+    in_flight.shared.progress.update(in_flight.number, |job| job.charts_done += parts.len());
+    if surface.complete_parts(parts) {
+        hand_on(finished, Finished::Surface(surface.clone()));
     }
 }
 

@@ -47,18 +47,21 @@ impl<T> Surface<T> {
         self.in_flight.shared.progress.update(self.in_flight.number, |job| job.charts += more);
     }
 
-    /// A part is done, or stopped. Whether it was the last one.
-    pub fn complete_part(&self, part_index: PartIndex, part: Result<T, Abort>) -> bool {
+    /// Parts are done, or stopped. Whether the last one is among them.
+    pub fn complete_parts(&self, completed: Vec<(PartIndex, Result<T, Abort>)>) -> bool {
         let mut parts = self.parts.lock();
-        match part {
-            Ok(done) => drop(parts.done.insert(part_index, done)),
-            Err(why) if parts.stopped.as_ref().is_none_or(|(stopped, _)| part_index < *stopped) => {
-                parts.stopped = Some((part_index, why));
+        let any = !completed.is_empty();
+        parts.missing -= completed.len();
+        for (part_index, part) in completed {
+            match part {
+                Ok(done) => drop(parts.done.insert(part_index, done)),
+                Err(why) if parts.stopped.as_ref().is_none_or(|(stopped, _)| part_index < *stopped) => {
+                    parts.stopped = Some((part_index, why));
+                }
+                Err(_) => {}
             }
-            Err(_) => {}
         }
-        parts.missing -= 1;
-        parts.missing == 0
+        any && parts.missing == 0
     }
 
     /// What is known so far, and the surface with what became of all charts in order, or why there are not all. Once: nothing
@@ -96,9 +99,10 @@ mod tests {
             surface.expect(1);
             let mut order = part_indices;
             order.rotate_left(turn);
-            assert!(!surface.complete_part((0, 0), Ok(())));
-            let last: Vec<bool> = order.iter().map(|p| surface.complete_part(*p, Err(refusal(*p)))).collect();
+            assert!(!surface.complete_parts(vec![((0, 0), Ok(()))]));
+            let last: Vec<bool> = order.iter().map(|p| surface.complete_parts(vec![(*p, Err(refusal(*p)))])).collect();
             assert_eq!(last, [false, false, true]);
+            assert!(!surface.complete_parts(vec![]), "nobody is told twice");
             assert!(surface.is_pending((0, 0)) && !surface.is_pending((0, 2)));
             assert_eq!(surface.collect().1.expect_err("stopped"), refusal((0, 1)));
         }

@@ -23,7 +23,8 @@ pub const PRESCRIBED: u32 = u32::MAX;
 /// Factors larger than this (bytes) are not made. A fixed number, so that results do not depend on the machine.
 const MAX_FACTOR_BYTES: usize = 8 << 30;
 
-/// Factors with no more entries are made in about a millisecond: they are no safe points, as they come by the thousand.
+/// Factors with no more entries are made in about a millisecond, and take half a megabyte: they are no safe points, and nothing is
+/// reserved for them, as they come by the thousand.
 const MAX_SMALL_ENTRIES: usize = 50_000;
 
 /// So many times the bytes of a general matrix (12 per entry) are reserved to solve it, as the size of its factors is
@@ -226,14 +227,15 @@ impl Analysis<'_> {
         self.symbolic.len_val()
     }
 
-    /// Factorises the matrix with these `values`. A safe point, unless it is small; the memory of the factor and of
+    /// Factorises the matrix with these `values`. Unless it is small it is a safe point, and the memory of the factor and of
     /// making it is reserved until the factor is dropped.
     ///
     /// # Errors
     /// [`Unsolvable::Singular`] when a pivot is not positive, [`Unsolvable::TooLarge`] when memory is short; or
     /// [`Interrupted`].
     pub fn factorise<'a>(&'a self, values: &[f64], monitor: &'a dyn Monitor) -> Result<Factor<'a>, Error> {
-        if self.factor_entries() > MAX_SMALL_ENTRIES && !monitor.should_continue() {
+        let is_small = self.factor_entries() <= MAX_SMALL_ENTRIES;
+        if !is_small && !monitor.should_continue() {
             return Err(Interrupted.into());
         }
         let unknowns = self.pattern.unknowns;
@@ -241,7 +243,7 @@ impl Analysis<'_> {
         let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
         let bytes = size_of::<f64>() * self.factor_entries() + scratch.unaligned_bytes_required();
         // Before what it stands for, and so dropped after that.
-        let reserved = Reserved::new(monitor, bytes as u64);
+        let reserved = (!is_small).then(|| Reserved::new(monitor, bytes as u64));
         let mut factor = Vec::new();
         factor.try_reserve_exact(self.symbolic.len_val()).map_err(|_| too_large.clone())?;
         factor.resize(self.symbolic.len_val(), 0.0);
@@ -261,7 +263,7 @@ pub struct Factor<'a> {
     symbolic: &'a SymbolicCholesky<u32>,
     values: Vec<f64>,
     /// Given back after the values: fields are dropped in this order.
-    _reserved: Reserved<'a>,
+    _reserved: Option<Reserved<'a>>,
 }
 
 impl Factor<'_> {
