@@ -44,26 +44,76 @@ pub(super) fn finish(
     cells: &Cells,
     size: impl Fn(HalfEdgeId) -> f64,
 ) -> Result<Atlas, Error> {
-    let mut best = Evaluated::new(Network::new(dual, labels, limits), cells)?;
-    let bands = if best.network.seams().next().is_some() { &BANDS[..] } else { &[] };
-    for (round, band) in bands.iter().enumerate() {
-        dual.checkpoint()?;
-        let gaps = gaps(&best.network)?;
-        let clear = |h: HalfEdgeId| SHARE * gaps.clearance[dual.from(h)].min(gaps.clearance[dual.to(h)]);
-        let breadth = |h: HalfEdgeId| clear(h).min(band * size(h));
-        let step = Step { cells, largest: settings.max_area_ratio, gaps: &gaps, shrink: round == 0 };
-        let StepOutcome::Undone { distorted } = best.step(&step, |h| Some(breadth(h)))? else { continue };
-        // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
-        for part in [None].into_iter().chain((0..PARTS).map(Some)) {
-            let part_of = best.parts(&distorted);
-            let in_part = |h: HalfEdgeId| (part_of(h) == part).then(|| breadth(h));
-            best.step(&step, in_part)?;
-        }
-    }
-    let Evaluated { network, predictions, .. } = best.unbent(cells)?;
+    let bands = Bands { size: &size, largest: settings.max_area_ratio };
+    let network = Network::new(dual, labels, limits);
+    let straight = match bands.all(&network, cells)? {
+        Some(straight) => straight,
+        None => bands.step_by_step(Evaluated::new(network, cells)?, cells)?,
+    };
+    let Evaluated { network, predictions, .. } = straight.unbent(cells)?;
     let mut atlas = assemble(dual.mesh, &network.labels)?;
     choose_outer(&mut atlas, &predictions);
     Ok(atlas)
+}
+
+/// How far seams may be straightened.
+struct Bands<'s, S> {
+    /// The size of the cell at a half-edge.
+    size: &'s S,
+    /// The largest area ratio.
+    largest: f64,
+}
+
+impl<S: Fn(HalfEdgeId) -> f64> Bands<'_, S> {
+    /// How far the seam may move at each half-edge, in one of the [`BANDS`].
+    fn breadth<'b>(&'b self, dual: &'b Dual, gaps: &'b Gaps, band: f64) -> impl Fn(HalfEdgeId) -> f64 + 'b {
+        move |h| {
+            let clear = gaps.clearance[dual.from(h)].min(gaps.clearance[dual.to(h)]);
+            (SHARE * clear).min(band * (self.size)(h))
+        }
+    }
+
+    /// All steps, with one prediction at the end, which is the half of what each costs: none where that is a chart's that is too
+    /// distorted, where one is no chart on the way, or where seams are closed, which may be held.
+    fn all<'a>(&self, network: &Network<'a>, cells: &Cells) -> Result<Option<Evaluated<'a>>, Interrupted> {
+        if network.curves().iter().any(|curve| network.dual.is_closed(curve)) {
+            return Ok(None);
+        }
+        let mut straight = network.clone();
+        for band in BANDS {
+            network.dual.checkpoint()?;
+            let gaps = gaps(&straight)?;
+            let breadth = self.breadth(network.dual, &gaps, band);
+            straight = straight.keeping(MIN_SHARE);
+            straighten(&mut straight, &gaps.crossing, |h| Some(breadth(h)))?;
+            if !straight.is_sound() {
+                return Ok(None);
+            }
+        }
+        let straight = Evaluated::new(straight, cells)?;
+        let is_kept = straight.predictions.iter().flatten().all(|prediction| prediction.ratio <= self.largest);
+        Ok(is_kept.then_some(straight))
+    }
+
+    /// One step after another, and each for what it is: what would be too distorted stays.
+    fn step_by_step<'a>(&self, mut best: Evaluated<'a>, cells: &Cells) -> Result<Evaluated<'a>, Interrupted> {
+        let dual = best.network.dual;
+        let bands = if best.network.seams().next().is_some() { &BANDS[..] } else { &[] };
+        for (round, band) in bands.iter().enumerate() {
+            dual.checkpoint()?;
+            let gaps = gaps(&best.network)?;
+            let breadth = self.breadth(dual, &gaps, *band);
+            let step = Step { cells, largest: self.largest, gaps: &gaps, shrink: round == 0 };
+            let StepOutcome::Undone { distorted } = best.step(&step, |h| Some(breadth(h)))? else { continue };
+            // The seams of the charts that it would distort too much, part by part: a neck is in one of them.
+            for part in [None].into_iter().chain((0..PARTS).map(Some)) {
+                let part_of = best.parts(&distorted);
+                let in_part = |h: HalfEdgeId| (part_of(h) == part).then(|| breadth(h));
+                best.step(&step, in_part)?;
+            }
+        }
+        Ok(best)
+    }
 }
 
 /// What holds for a step of straightening.
