@@ -5,7 +5,7 @@
 //! normals of the triangles around, weighted by area, on either side: sides that meet around the ends of the edge
 //! within a few triangles are the same side. Chains that are short all told are dropped, and patches that are small
 //! all round, or narrow bevels, are given to the neighbour with which they share most, but for those that are flat between
-//! sharp features: noise makes none of these. What separates nothing then is no feature. Where coordinates lie in coarse
+//! sharp features, and chains around these: noise makes none of them. What separates nothing then is no feature. Where coordinates lie in coarse
 //! steps ([`crate::mesh::SurfaceMesh::coarse_steps`]) the angles are those that rounding leaves sure: the stairs that it
 //! makes of a slope are no features.
 
@@ -87,11 +87,11 @@ struct Crease {
 fn mark_features(dual: &mut Dual, angle: f64) -> Result<usize, Interrupted> {
     let cos = |degrees: f64| degrees.to_radians().cos();
     let (sharp, blunt) = (cos(angle), cos(LOWER * angle));
-    let creases = long_enough(dual, creases(dual, blunt), 1.0 - sharp);
-    for crease in &creases {
-        let edge = dual.mesh.edges().edge(crease.edge).index();
-        dual.sharpness[edge] = crease.sharpness;
-    }
+    let creases = creases(dual, blunt);
+    mark(dual, &creases);
+    let is_around_face = around_flat_faces(dual, &creases);
+    let (creases, short) = long_enough(dual, creases, &is_around_face, 1.0 - sharp);
+    short.iter().for_each(|crease| dual.sharpness[dual.mesh.edges().edge(crease.edge).index()] = 0.0);
     let features: Vec<HalfEdgeId> = creases.into_iter().map(|crease| crease.edge).collect();
     // Every time some patches are united with others, so that fewer are left.
     dual.checkpoint()?;
@@ -312,16 +312,33 @@ fn sum_of(normals: &[Vec3], faces: &[FaceId]) -> Vec3 {
     faces.iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + normals[f.index()][k]))
 }
 
-/// Those of the creases whose connected ones above the sharpness `strong` are long enough together.
-fn long_enough(dual: &Dual, creases: Vec<Crease>, strong: f64) -> Vec<Crease> {
+fn mark(dual: &mut Dual, creases: &[Crease]) {
+    for crease in creases {
+        let edge = dual.mesh.edges().edge(crease.edge).index();
+        dual.sharpness[edge] = crease.sharpness;
+    }
+}
+
+/// Per crease, all of which are marked, whether it goes around a flat face ([`Patch::is_flat_face`]).
+fn around_flat_faces(dual: &Dual, creases: &[Crease]) -> Vec<bool> {
+    let (patch_of, count) = patches(dual);
+    let is_flat_face: Vec<bool> = measured(dual, &patch_of, count).iter().map(Patch::is_flat_face).collect();
+    let is_of_face = |h: HalfEdgeId| is_flat_face[patch_of[h.face().index()] as usize];
+    creases.iter().map(|c| is_of_face(c.edge) || dual.twin(c.edge).is_some_and(is_of_face)).collect()
+}
+
+/// Those of the creases whose connected ones above the sharpness `strong` are long enough together, or some of which go around flat
+/// faces, and the others. (A plate with 6,000 square holes has holes whose edges are 4 % of its size.)
+fn long_enough(dual: &Dual, creases: Vec<Crease>, is_around_face: &[bool], strong: f64) -> (Vec<Crease>, Vec<Crease>) {
     let mut chains = UnionFind::new(dual.mesh.points().len());
     for crease in &creases {
         chains.merge(dual.from(crease.edge), dual.to(crease.edge));
     }
     let mut lengths = vec![0.0; dual.mesh.points().len()];
-    for crease in creases.iter().filter(|crease| crease.sharpness > strong) {
-        lengths[chains.find(dual.from(crease.edge))] += dual.length(crease.edge);
+    for (crease, is_around_face) in creases.iter().zip(is_around_face).filter(|(crease, _)| crease.sharpness > strong) {
+        let length = if *is_around_face { f64::INFINITY } else { dual.length(crease.edge) };
+        lengths[chains.find(dual.from(crease.edge))] += length;
     }
     let min_length = MIN_LENGTH * dual.total_area().sqrt();
-    creases.into_iter().filter(|crease| lengths[chains.find(dual.from(crease.edge))] >= min_length).collect()
+    creases.into_iter().partition(|crease| lengths[chains.find(dual.from(crease.edge))] >= min_length)
 }

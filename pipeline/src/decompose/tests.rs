@@ -331,17 +331,21 @@ fn a_bevel_is_a_face_unless_it_is_narrow() {
     assert_eq!((charts(0.2), charts(0.004)), (3, 2));
 }
 
-/// A square plate with a cube of a 60th of its width on it; the corners of its top are moved by `uneven` of that, so that
-/// none of its sides is flat.
-fn with_small_cube(uneven: f64) -> TriangleSoup {
+/// A square plate with a small cube on it, of a 60th of its width where all squares are as large, and less where those `in_middle`
+/// are this share of it; the corners of its top are moved by `uneven` of that, so that none of its sides is flat.
+fn with_small_cube(in_middle: f64, uneven: f64) -> TriangleSoup {
     let n = 60_u32;
-    let at = |i: u32, j: u32| [f64::from(i) / f64::from(n), f64::from(j) / f64::from(n), 0.0];
+    let along = |i: u32| {
+        let from_middle = (f64::from(i) - 0.5) / f64::from(n) - 0.5;
+        from_middle * (in_middle + 2.0 * (1.0 - in_middle) * from_middle.abs())
+    };
+    let at = |i: u32, j: u32| [along(i), along(j), 0.0];
     let mut points: Vec<[f64; 3]> = (0..=n).flat_map(|j| (0..=n).map(move |i| at(i, j))).collect();
     let cell = |(i, j): (u32, u32)| {
         let a = j * (n + 1) + i;
         [a, a + 1, a + n + 2, a + n + 1]
     };
-    let (middle, side) = ((n / 2, n / 2), 1.0 / f64::from(n));
+    let (middle, side) = ((n / 2, n / 2), along(n / 2 + 1) - along(n / 2));
     let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j))).filter(|cell| *cell != middle);
     let mut triangles: Vec<[u32; 3]> = cells.flat_map(|c| shapes::halves(cell(c))).collect();
     let foot = cell(middle);
@@ -362,8 +366,10 @@ fn with_small_cube(uneven: f64) -> TriangleSoup {
 
 #[test]
 fn small_faces_are_kept_where_they_are_flat() {
-    let charts = |uneven: f64| atlas(&with_small_cube(uneven), &Settings::default()).charts().len();
-    assert_eq!((charts(0.0), charts(0.1)), (6, 1));
+    let charts = |in_middle, uneven| atlas(&with_small_cube(in_middle, uneven), &Settings::default()).charts().len();
+    assert_eq!((charts(1.0, 0.0), charts(1.0, 0.1)), (6, 1));
+    // Edges of 4 % of the width all told.
+    assert_eq!((charts(0.2, 0.0), charts(0.2, 0.1)), (6, 1));
 }
 
 /// Two soups as one.
