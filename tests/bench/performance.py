@@ -87,12 +87,17 @@ def mmgs(path, options):
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "in.mesh"
         write_medit(source, *surface(path))
-        return pinned([beside_python("mmgs_O3"), "-v", "0", source, Path(folder) / "out.mesh"], options)[0]
+        return pinned([mmgs_program(), "-v", "0", source, Path(folder) / "out.mesh"], options)[0]
+
+
+def mmgs_program():
+    """The wheels mmgpy and pymmg call it differently."""
+    return beside_python("mmgs_O3") or beside_python("mmgs")
 
 
 def is_there(name):
     if name == "mmgs":
-        return beside_python("mmgs_O3") is not None
+        return mmgs_program() is not None
     return subprocess.run([sys.executable, "-c", f"import {name}"], capture_output=True).returncode == 0
 
 
