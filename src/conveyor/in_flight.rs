@@ -443,15 +443,18 @@ pub(super) mod tests {
                 both.wait();
             })
         };
+        let together = |tasks: Vec<Task<'_>>| {
+            in_flight.compute(Stage::Map, |monitor| {
+                monitor.together(tasks);
+                Ok(())
+            })
+        };
         // They wait for each other.
-        assert_eq!(in_flight.compute(Stage::Map, |monitor| Ok(monitor.together(vec![meet(), meet()]))), Ok(()));
-        let broken = in_flight.compute(Stage::Map, |monitor| {
-            monitor.together(vec![Box::new(|_| ()), Box::new(|_| panic!("a fault, for the test")), Box::new(|_| ())]);
-            Ok(())
-        });
+        assert_eq!(together(vec![meet(), meet()]), Ok(()));
+        let broken = together(vec![Box::new(|_| ()), Box::new(|_| panic!("a fault, for the test")), Box::new(|_| ())]);
         assert!(matches!(broken, Err(Abort::For(reason)) if reason.code == Code::Internal));
         // Nobody is left who holds a place.
-        assert_eq!(in_flight.compute(Stage::Map, |monitor| Ok(monitor.together(vec![meet(), meet()]))), Ok(()));
+        assert_eq!(together(vec![meet(), meet()]), Ok(()));
     }
 
     #[test]
@@ -463,7 +466,11 @@ pub(super) mod tests {
             let done = &done;
             Box::new(move |_| done.lock().push((number, std::thread::current().id())))
         };
-        assert_eq!(in_flight.compute(Stage::Map, |monitor| Ok(monitor.together((0..9).map(task).collect()))), Ok(()));
+        let all = in_flight.compute(Stage::Map, |monitor| {
+            monitor.together((0..9).map(task).collect());
+            Ok(())
+        });
+        assert_eq!(all, Ok(()));
         let here = std::thread::current().id();
         assert_eq!(done.into_inner(), (0..9).map(|number| (number, here)).collect::<Vec<_>>());
     }
