@@ -35,25 +35,30 @@ const fn strategy(regions: usize, weights: Weights, axis: Option<usize>) -> Stra
     Strategy { regions, weights, axis }
 }
 
-/// (Of fifteen strategies without sides that were tried on 25 surfaces, these found the fewest charts between them. Those come first
-/// that found the best two charts of twelve smooth surfaces.)
+/// (Of fifteen strategies without sides that were tried on 25 surfaces, these found the fewest charts between them.)
 const STRATEGIES: [Strategy; 9] = [
-    strategy(240, COMPACT, None),
+    strategy(96, BALANCED, None),
+    strategy(128, BALANCED, None),
+    strategy(160, BALANCED, None),
     strategy(240, BALANCED, None),
     strategy(96, COMPACT, None),
-    strategy(96, BALANCED, None),
-    strategy(160, BALANCED, None),
-    strategy(128, BALANCED, None),
+    strategy(240, COMPACT, None),
     strategy(160, BALANCED, Some(0)),
     strategy(160, BALANCED, Some(1)),
     strategy(160, BALANCED, Some(2)),
 ];
 
-/// What cannot be left whole falls into two charts at least. Where so many strategies have found two, at such a cost at most, no
-/// others are asked: growing took a third of the time for 10,000 triangles. Of twenty surfaces all keep their charts; with any
-/// cost bunny_stanford (4.7 and more) falls into four instead of two, when its ears are mapped.
+/// Their order for simple shapes ([`is_simple`]): those first that find the best two charts of twelve smooth surfaces.
+const SIMPLE_FIRST: [usize; 9] = [5, 3, 4, 0, 2, 1, 6, 7, 8];
+
+/// What cannot be left whole falls into two charts at least. Where so many strategies have found two for a simple shape, at such a cost
+/// at most, no others are asked: growing took a third of the time for 10,000 triangles. With any cost bunny_stanford (4.7 and more)
+/// falls into four charts instead of two, when its ears are mapped.
 const ENOUGH: usize = 3;
 const EASY: Score = Score { charts: 2, cost: 4.5 };
+
+/// A shape with fewer cells takes little time in any case.
+const MANY_CELLS: usize = 400;
 
 /// What seams as long as the square root of the area count, against a decade of the worst area ratio. (They will be a
 /// third shorter when they are straight.) By experience; it only decides among strategies with the same number of charts.
@@ -128,11 +133,21 @@ impl Sums {
     }
 }
 
+/// Whether the components are one of many cells, with a handle at most.
+fn is_simple(components: &mut Regions) -> bool {
+    let outline = components.outline_of(0);
+    let [component] = &components.all[..] else { return false };
+    let shape = components.shape(component, &outline);
+    // Euler number = 2 - 2 genus - loops.
+    component.cells.len() >= MANY_CELLS && shape.euler + shape.loops as i64 >= 0
+}
+
 impl Search<'_> {
     /// Grows charts by every strategy, for the components that cannot be left whole.
     pub(super) fn run(&mut self) -> Result<SearchResult, Interrupted> {
         let components = farthest_first(self.graph, |_| 1);
-        let whole = Regions::new(self.complex, components.labels.clone(), components.len);
+        let mut whole = Regions::new(self.complex, components.labels.clone(), components.len);
+        let is_simple = is_simple(&mut whole);
         let whole = self.fine(whole, WHOLE * self.limits.largest_ratio)?;
         let mut strategies = vec![components.labels.clone()];
         // The first strategy, of one chart for each component, is open to those that can be left whole, and to them alone.
@@ -142,11 +157,12 @@ impl Search<'_> {
             ranked.push(if *is_whole { vec![as_one] } else { vec![] });
         }
         let axes = principal_axes(self.complex, &components);
-        for strategy in &STRATEGIES {
-            let easy = |ranked: &Vec<Ranked>| ranked.iter().filter(|found| found.score <= EASY).count();
-            if whole.iter().zip(&ranked).all(|(is_whole, ranked)| *is_whole || easy(ranked) >= ENOUGH) {
+        let order = if is_simple { SIMPLE_FIRST } else { std::array::from_fn(|number| number) };
+        for number in order.into_iter().filter(|_| whole.contains(&false)) {
+            if is_simple && ranked[0].iter().filter(|found| found.score <= EASY).count() >= ENOUGH {
                 break;
             }
+            let strategy = &STRATEGIES[number];
             let (of, scores) = self.grow(strategy, &components, &axes, &whole)?;
             for (component, score) in scores.into_iter().enumerate() {
                 if !whole[component] {
@@ -155,11 +171,11 @@ impl Search<'_> {
             }
             strategies.push(of);
         }
-        let order = |a: &Ranked, b: &Ranked| {
+        let by_score = |a: &Ranked, b: &Ranked| {
             let by_charts = a.score.charts.cmp(&b.score.charts);
             by_charts.then(a.score.cost.total_cmp(&b.score.cost)).then(a.strategy.cmp(&b.strategy))
         };
-        ranked.iter_mut().for_each(|r| r.sort_by(order));
+        ranked.iter_mut().for_each(|r| r.sort_by(by_score));
         Ok(SearchResult { components, ranked, strategies })
     }
 
