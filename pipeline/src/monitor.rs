@@ -13,7 +13,7 @@
 //! their own in this.
 
 use std::cell::Cell;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A part of a computation that needs none of its other parts; it is given the monitor that it must ask.
 pub type Task<'a> = Box<dyn FnOnce(&dyn Monitor) + Send + 'a>;
@@ -46,6 +46,25 @@ pub fn one_by_one(tasks: Vec<Task<'_>>, monitor: &dyn Monitor) {
 /// a hundred.
 const LITTLE: usize = 2_000;
 
+/// `items` in their order, neighbours together as long as they have no more than `most` triangles: what is small is not worth a task, or
+/// a journey, of its own.
+pub fn batches<T>(items: impl IntoIterator<Item = T>, triangles: impl Fn(&T) -> usize, most: usize) -> Vec<Vec<T>> {
+    let mut batches: Vec<Vec<T>> = Vec::new();
+    let mut room = 0;
+    for item in items {
+        let count = triangles(&item);
+        match batches.last_mut().filter(|_| room >= count) {
+            Some(batch) => batch.push(item),
+            None => {
+                batches.push(vec![item]);
+                room = most;
+            }
+        }
+        room = room.saturating_sub(count);
+    }
+    batches
+}
+
 /// What `work` makes of each of `items`, which have so many `triangles` in all, in their order; some at the same time, where the
 /// monitor has processors to spare. Behind a failure no more are begun.
 ///
@@ -61,19 +80,21 @@ pub(crate) fn try_each<T: Send, R: Send, E: Send>(
         return items.into_iter().map(|item| work(item, monitor)).collect();
     }
     let mut done: Vec<Option<Result<R, E>>> = items.iter().map(|_| None).collect();
-    let (work, has_failed) = (&work, &AtomicBool::new(false));
+    let (work, failed) = (&work, &AtomicUsize::new(usize::MAX));
     let mut tasks: Vec<Task<'_>> = Vec::with_capacity(items.len());
-    for (item, done) in items.into_iter().zip(&mut done) {
+    for (number, (item, done)) in items.into_iter().zip(&mut done).enumerate() {
         tasks.push(Box::new(move |monitor| {
-            if !has_failed.load(Ordering::Relaxed) {
+            // One before a failure is done in any case, whoever was faster: it may fail, too, and be the first.
+            if number < failed.load(Ordering::Relaxed) {
                 let result = work(item, monitor);
-                has_failed.fetch_or(result.is_err(), Ordering::Relaxed);
+                if result.is_err() {
+                    failed.fetch_min(number, Ordering::Relaxed);
+                }
                 *done = Some(result);
             }
         }));
     }
     monitor.together(tasks);
-    // Those before the first failure were begun before it, and have ended.
     done.into_iter().flatten().collect()
 }
 
@@ -372,6 +393,16 @@ mod tests {
         assert_eq!(try_each(&NoMonitor, vec![0, 1, 3, 4], LITTLE, work), Ok(vec![0, 10, 30, 40]));
         assert_eq!(try_each(&NoMonitor, (0..9).collect(), LITTLE, work), Err(2));
         assert_eq!(begun.into_inner(), 4 + 3);
+        // Whoever is faster.
+        let work = |number: usize, _: &dyn Monitor| if number % 3 == 2 { Err(number) } else { Ok(number) };
+        assert_eq!(try_each(&Backwards, (0..9).collect(), LITTLE, work), Err(2));
+    }
+
+    #[test]
+    fn small_neighbours_are_one_batch() {
+        let of = |items: &[usize]| batches(items.iter().copied(), |count| *count, 10);
+        assert_eq!(of(&[3, 3, 4, 1, 20, 2, 9, 1]), [vec![3, 3, 4], vec![1], vec![20], vec![2], vec![9, 1]]);
+        assert!(of(&[]).is_empty());
     }
 
     #[test]

@@ -300,26 +300,17 @@ impl Monitor for Permit<'_> {
         }
         let tasks = Mutex::new(VecDeque::from(tasks));
         let next = || tasks.lock().pop_front();
-        let help = || {
-            let no_more = |permit: &Permit| {
-                while let Some(task) = next() {
-                    task(permit)
-                }
-            };
-            in_flight.inside(stage, no_more);
+        let work = |permit: &Permit| {
+            while let Some(task) = next() {
+                task(permit);
+            }
         };
         let helped = std::thread::scope(|scope| {
+            let help = || in_flight.inside(stage, work);
+            let named = || std::thread::Builder::new().name(stage.name().to_owned());
             // Where the system has no thread, nobody helps.
-            let helpers: Vec<_> = (0..helpers)
-                .filter_map(|_| {
-                    std::thread::Builder::new().name(stage.name().to_owned()).spawn_scoped(scope, help).ok()
-                })
-                .collect();
-            let own = catch_unwind(AssertUnwindSafe(|| {
-                while let Some(task) = next() {
-                    task(self)
-                }
-            }));
+            let helpers: Vec<_> = (0..helpers).filter_map(|_| named().spawn_scoped(scope, help).ok()).collect();
+            let own = catch_unwind(AssertUnwindSafe(|| work(self)));
             // Nobody waits for others while it holds a place.
             shared.grants.leave();
             let of_helpers: Vec<_> = helpers.into_iter().map(|helper| helper.join()).collect();

@@ -46,7 +46,7 @@ use grants::{Grants, Own};
 use in_flight::{InFlight, Shared};
 use parking_lot::RwLock;
 use planish_core::mesh::TriangleSoup;
-use planish_core::monitor::Monitor;
+use planish_core::monitor::{Monitor, batches};
 use planish_core::{CertifiedChart, ChartJob, MappedChart, Plan, Surveyed};
 use progress::{Progress, Running};
 use queue::Queue;
@@ -294,20 +294,8 @@ impl<T, R> Charts<T, R> {
         triangles: impl Fn(&T) -> usize,
         to: &Sender<Self>,
     ) {
-        let (mut together, mut room) = (Vec::new(), 0);
-        for (part_index, chart) in charts {
-            let count = triangles(&chart);
-            if !together.is_empty() && count > room {
-                hand_on(to, Self { surface: surface.clone(), charts: std::mem::take(&mut together) });
-            }
-            if together.is_empty() {
-                room = TOGETHER;
-            }
-            room = room.saturating_sub(count);
-            together.push((part_index, chart));
-        }
-        if !together.is_empty() {
-            hand_on(to, Self { surface: surface.clone(), charts: together });
+        for charts in batches(charts, |(_, chart)| triangles(chart), TOGETHER) {
+            hand_on(to, Self { surface: surface.clone(), charts });
         }
     }
 

@@ -99,7 +99,7 @@ impl<'a> Dual<'a> {
         for (local, face) in faces.iter().enumerate() {
             made.is_kept[local] = features.is_kept[face.index()];
             for (h, there) in FaceId::at(local).sides().into_iter().zip(face.sides()) {
-                made.sharpness[part.edges().edge(h).index()] = features.sharpness[whole.edges().edge(there).index()];
+                made.set_sharpness(h, features.sharpness[whole.edges().edge(there).index()]);
             }
         }
         made
@@ -160,6 +160,11 @@ impl<'a> Dual<'a> {
     /// See the field of this name.
     pub(super) fn sharpness(&self, h: HalfEdgeId) -> f64 {
         self.sharpness[self.mesh.edges().edge(h).index()]
+    }
+
+    /// Makes the edge along `h` a feature that is so sharp, or none.
+    pub(super) fn set_sharpness(&mut self, h: HalfEdgeId, sharpness: f64) {
+        self.sharpness[self.mesh.edges().edge(h).index()] = sharpness;
     }
 
     /// The vertex at which `h` begins.

@@ -5,9 +5,9 @@
 //! normals of the triangles around, weighted by area, on either side: sides that meet around the ends of the edge
 //! within a few triangles are the same side. Chains that are short all told are dropped, and patches that are small
 //! all round, or narrow bevels, are given to the neighbour with which they share most, but for those that are flat between
-//! sharp features, and chains around these: noise makes none of them. What separates nothing then is no feature. Where coordinates lie in coarse
-//! steps ([`crate::mesh::SurfaceMesh::coarse_steps`]) the angles are those that rounding leaves sure: the stairs that it
-//! makes of a slope are no features.
+//! sharp features, and chains around these: noise makes none of them. What separates nothing then is no feature. Where
+//! coordinates lie in coarse steps ([`crate::mesh::SurfaceMesh::coarse_steps`]) the angles are those that rounding leaves
+//! sure: the stairs that it makes of a slope are no features.
 
 use super::Settings;
 use super::dual::Dual;
@@ -88,10 +88,10 @@ fn mark_features(dual: &mut Dual, angle: f64) -> Result<usize, Interrupted> {
     let cos = |degrees: f64| degrees.to_radians().cos();
     let (sharp, blunt) = (cos(angle), cos(LOWER * angle));
     let creases = creases(dual, blunt);
-    mark(dual, &creases);
+    creases.iter().for_each(|crease| dual.set_sharpness(crease.edge, crease.sharpness));
     let is_around_face = around_flat_faces(dual, &creases);
     let (creases, short) = long_enough(dual, creases, &is_around_face, 1.0 - sharp);
-    short.iter().for_each(|crease| dual.sharpness[dual.mesh.edges().edge(crease.edge).index()] = 0.0);
+    short.iter().for_each(|crease| dual.set_sharpness(crease.edge, 0.0));
     let features: Vec<HalfEdgeId> = creases.into_iter().map(|crease| crease.edge).collect();
     // Every time some patches are united with others, so that fewer are left.
     dual.checkpoint()?;
@@ -169,8 +169,7 @@ fn drop_small_patches(dual: &mut Dual, features: &[HalfEdgeId]) -> bool {
     for h in features {
         let Some(t) = dual.twin(*h).filter(|t| patch(*t) != patch(*h)) else { continue };
         if united.find(patch(t)) == united.find(patch(*h)) {
-            let edge = dual.mesh.edges().edge(*h).index();
-            dual.sharpness[edge] = 0.0;
+            dual.set_sharpness(*h, 0.0);
         }
     }
     !borders.is_empty()
@@ -261,7 +260,7 @@ impl Patch {
 fn drop_dangling(dual: &mut Dual, features: &[HalfEdgeId], patch_of: &[u32]) {
     for h in features {
         if dual.twin(*h).is_some_and(|t| patch_of[t.face().index()] == patch_of[h.face().index()]) {
-            dual.sharpness[dual.mesh.edges().edge(*h).index()] = 0.0;
+            dual.set_sharpness(*h, 0.0);
         }
     }
 }
@@ -310,13 +309,6 @@ fn side(dual: &Dual, candidate: &[bool], h: HalfEdgeId) -> Vec<FaceId> {
 /// The sum of the area vectors of some triangles.
 fn sum_of(normals: &[Vec3], faces: &[FaceId]) -> Vec3 {
     faces.iter().fold([0.0; 3], |sum, f| [0, 1, 2].map(|k| sum[k] + normals[f.index()][k]))
-}
-
-fn mark(dual: &mut Dual, creases: &[Crease]) {
-    for crease in creases {
-        let edge = dual.mesh.edges().edge(crease.edge).index();
-        dual.sharpness[edge] = crease.sharpness;
-    }
 }
 
 /// Per crease, all of which are marked, whether it goes around a flat face ([`Patch::is_flat_face`]).

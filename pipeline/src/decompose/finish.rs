@@ -46,9 +46,12 @@ pub(super) fn finish(
 ) -> Result<Atlas, Error> {
     let bands = Bands { size: &size, largest: settings.max_area_ratio };
     let network = Network::new(dual, labels, limits);
-    let straight = match bands.all(&network, cells)? {
-        Some(straight) => straight,
-        None => bands.step_by_step(Evaluated::new(network, cells)?, cells)?,
+    let straight = if network.seams().next().is_none() {
+        Evaluated::new(network, cells)?
+    } else if let Some(straight) = bands.all(&network, cells)? {
+        straight
+    } else {
+        bands.step_by_step(Evaluated::new(network, cells)?, cells)?
     };
     let Evaluated { network, predictions, .. } = straight.unbent(cells)?;
     let mut atlas = assemble(dual.mesh, &network.labels)?;
@@ -98,11 +101,10 @@ impl<S: Fn(HalfEdgeId) -> f64> Bands<'_, S> {
     /// One step after another, and each for what it is: what would be too distorted stays.
     fn step_by_step<'a>(&self, mut best: Evaluated<'a>, cells: &Cells) -> Result<Evaluated<'a>, Interrupted> {
         let dual = best.network.dual;
-        let bands = if best.network.seams().next().is_some() { &BANDS[..] } else { &[] };
-        for (round, band) in bands.iter().enumerate() {
+        for (round, band) in BANDS.into_iter().enumerate() {
             dual.checkpoint()?;
             let gaps = gaps(&best.network)?;
-            let breadth = self.breadth(dual, &gaps, *band);
+            let breadth = self.breadth(dual, &gaps, band);
             let step = Step { cells, largest: self.largest, gaps: &gaps, shrink: round == 0 };
             let StepOutcome::Undone { distorted } = best.step(&step, |h| Some(breadth(h)))? else { continue };
             // The seams of the charts that it would distort too much, part by part: a neck is in one of them.

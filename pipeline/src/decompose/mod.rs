@@ -48,7 +48,7 @@ mod voronoi;
 
 use crate::atlas::{Atlas, Chart};
 use crate::mesh::{SurfaceMesh, vertices_of};
-use crate::monitor::{Interrupted, Monitor, try_each};
+use crate::monitor::{Interrupted, Monitor, batches, try_each};
 use crate::topology::{ChartId, FaceId, HalfEdgeId, components};
 pub use assemble::assemble;
 pub(crate) use assemble::with_outer;
@@ -161,45 +161,32 @@ pub fn decompose(mesh: &SurfaceMesh, settings: &Settings, monitor: &dyn Monitor)
         let part = mesh.restricted(faces);
         let atlas = component(&Dual::of_part(&part, faces, mesh, &features, monitor), least, settings)?;
         let vertices = vertices_of(mesh.triangles(), faces);
+        // They are numbered when all are there.
         let on_surface = |chart: Chart| chart.on_surface(ChartId(0), &vertices, faces);
-        Ok(atlas.into_charts().into_iter().map(on_surface).collect::<Vec<Chart>>())
+        Ok::<Vec<Chart>, Error>(atlas.into_charts().into_iter().map(on_surface).collect())
     };
     let of_batch = |batch: Vec<Vec<FaceId>>, monitor: &dyn Monitor| {
-        let charts = batch.iter().map(|faces| of_component(faces, monitor)).collect::<Result<Vec<_>, Error>>()?;
-        Ok::<_, Error>(charts.into_iter().flatten().collect::<Vec<Chart>>())
+        let mut charts = Vec::new();
+        for faces in &batch {
+            charts.extend(of_component(faces, monitor)?);
+        }
+        Ok::<_, Error>(charts)
     };
-    let charts = try_each(monitor, batches(components), mesh.triangles().len(), of_batch)?;
+    let batches = batches(components, Vec::len, BATCH);
+    let charts = try_each(monitor, batches, mesh.triangles().len(), of_batch)?;
     let mut charts: Vec<Chart> = charts.into_iter().flatten().collect();
     charts.sort_by_key(|chart| chart.faces[0]);
-    // They are numbered here.
     for (chart, id) in charts.iter_mut().zip(0..) {
         chart.id = ChartId(id);
     }
     Ok(Atlas { charts, feature_edges })
 }
 
-/// Components of so many triangles are one task: of mri_brain_iso 1,400 have a dozen each.
+/// Small components are one task until they have so many triangles: of mri_brain_iso 1,400 have a dozen each.
 const BATCH: usize = 4_000;
 
-/// Components in their order, neighbours together until they have [`BATCH`] triangles.
-fn batches(components: Vec<Vec<FaceId>>) -> Vec<Vec<Vec<FaceId>>> {
-    let mut batches: Vec<Vec<Vec<FaceId>>> = Vec::new();
-    let mut room = 0;
-    for component in components {
-        let triangles = component.len();
-        match batches.last_mut().filter(|_| room >= triangles) {
-            Some(batch) => batch.push(component),
-            None => {
-                batches.push(vec![component]);
-                room = BATCH;
-            }
-        }
-        room = room.saturating_sub(triangles);
-    }
-    batches
-}
-
-/// Cuts a connected surface, whose features are marked, into charts. Patches between features with an outline below `least` are no faces.
+/// Cuts a connected surface, whose features are marked, into charts. Patches between features with an outline below `least` are no
+/// faces.
 fn component(dual: &Dual, least: f64, settings: &Settings) -> Result<Atlas, Error> {
     let limits = Limits::new(settings);
     let (cells, complex) = cells(dual, &limits)?;

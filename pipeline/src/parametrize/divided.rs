@@ -16,10 +16,30 @@ impl<T> Triangles for (Chart, T) {
     }
 }
 
+/// Something with its number.
+impl<T: Triangles> Triangles for (usize, T) {
+    fn triangles(&self) -> usize {
+        self.1.triangles()
+    }
+}
+
 impl Triangles for Chart {
     fn triangles(&self) -> usize {
         self.triangles().len()
     }
+}
+
+/// What `work` makes of each of `items`, in their order ([`try_each`]).
+///
+/// # Errors
+/// That of the first item for which `work` fails.
+pub(super) fn each<T: Triangles + Send, R: Send, E: Send>(
+    items: Vec<T>,
+    monitor: &dyn Monitor,
+    work: impl Fn(T, &dyn Monitor) -> Result<R, E> + Sync,
+) -> Result<Vec<R>, E> {
+    let triangles = items.iter().map(Triangles::triangles).sum();
+    try_each(monitor, items, triangles, work)
 }
 
 /// What becomes of a piece.
@@ -56,9 +76,8 @@ pub(super) fn divided<T: Triangles + Send, R: Send, E: Send>(
     let mut waiting: Vec<(usize, T)> = pieces.into_iter().enumerate().collect();
     while !waiting.is_empty() {
         are_few(leaves)?;
-        let triangles = waiting.iter().map(|(_, piece)| piece.triangles()).sum();
         let look = |(number, piece): (usize, T), monitor: &dyn Monitor| Ok((number, look(piece, monitor)?));
-        for (number, piece) in try_each(monitor, std::mem::take(&mut waiting), triangles, look)? {
+        for (number, piece) in each(std::mem::take(&mut waiting), monitor, look)? {
             nodes[number] = match piece {
                 Piece::Done(result) => Node::Done(result),
                 Piece::Divided(pieces) => {

@@ -1,7 +1,7 @@
 //! One chart through the stages: linear map, quadratic map, untangling, certificate.
 
 use super::cut::{Attempt, Cutter, Mapped};
-use super::divided::{Piece, Triangles, divided};
+use super::divided::{Piece, divided, each};
 use super::join::joined;
 use crate::atlas::Chart;
 use crate::certified::{BoundaryFound, CertifiedChart, Harmonic, LinearSummary, Provenance};
@@ -18,7 +18,7 @@ use crate::map::natural::{
 use crate::map::quadratic::{QuadraticMap, min_det, quadratic_map};
 use crate::measure::distortion;
 use crate::mesh::TriangleShape;
-use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor, try_each};
+use crate::monitor::{Checkpoint, Interrupted, Monitor, NoMonitor};
 use crate::refine;
 use crate::settings::{BoundaryShape, ChartSettings, Order, OutOfRange};
 use crate::topology::FaceId;
@@ -233,9 +233,8 @@ impl ChartJob {
                 Err(_) => Self::new(chart, settings).mapped_parts(monitor)?,
             },
         };
-        let triangles = parts.iter().map(Triangles::triangles).sum();
-        let freed = |(chart, maps), monitor: &dyn Monitor| freed_or_cut(chart, &settings, maps, monitor);
-        let found = try_each(monitor, parts, triangles, freed)?;
+        let freed = |(chart, maps): Mapped, monitor: &dyn Monitor| freed_or_cut(chart, &settings, maps, monitor);
+        let found = each(parts, monitor, freed)?;
         let mapped = |(chart, maps)| MappedChart { chart, settings, maps };
         Ok(found.into_iter().flatten().map(mapped).collect())
     }
@@ -469,8 +468,7 @@ pub(super) fn freed_or_cut(
         let maps = freed_where_stretched(&chart, settings, maps, monitor)?;
         Ok((chart, maps))
     };
-    let triangles = parts.iter().map(Triangles::triangles).sum();
-    try_each(monitor, parts, triangles, freed)
+    each(parts, monitor, freed)
 }
 
 /// The maps of a chart with another boundary, where that stretches less. Those on the circle for want of a natural one get a

@@ -6,14 +6,14 @@
 //! as they were by themselves are kept, and so are those of charts that stayed as they are.
 
 use super::cut::Mapped;
-use super::divided::Triangles;
+use super::divided::each;
 use super::job::{ChartError, ChartJob, MapError, MappedChart, Maps, finer_maps, freed_or_cut};
 use crate::atlas::Chart;
 use crate::certified::BoundaryFound;
 use crate::decompose::{self, Illegal, assemble, with_outer};
 use crate::grid::GridPoint;
 use crate::mesh::SurfaceMesh;
-use crate::monitor::{Monitor, try_each};
+use crate::monitor::Monitor;
 use crate::refine::POOR;
 use crate::refine::bisect::{Ends, Refined, Step};
 use crate::settings::Order;
@@ -113,9 +113,7 @@ impl ChartJob {
             };
             found.into_iter().map(part).collect::<Result<Vec<Part>, ChartError>>()
         };
-        let mapped = self.mapped_parts(monitor)?;
-        let triangles = mapped.iter().map(Triangles::triangles).sum();
-        let parts = try_each(monitor, mapped, triangles, of_part)?;
+        let parts = each(self.mapped_parts(monitor)?, monitor, of_part)?;
         Ok(Surveyed { parts: parts.into_iter().flatten().collect() })
     }
 }
