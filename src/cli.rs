@@ -1,7 +1,7 @@
 //! The command line.
 
 use crate::settings::{
-    AlsoFiles, Boundary, ExportTarget, FeatureAngle, Inputs, Log, RawSettings, Refine, Refused, Settings, SettingsError,
+    AlsoFiles, Boundary, ExportTargets, FeatureAngle, Inputs, Log, RawSettings, Refine, Refused, Settings, SettingsError,
 };
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
@@ -147,9 +147,10 @@ pub struct Making {
     /// [default: 4]. The surface does not change, and triangles tell which one of the input they are part of
     #[arg(long, value_name = "N|off")]
     pub refine: Option<Refine>,
-    /// Meshers to which results are handed: gmsh writes atlas.msh and remesh.geo [default: gmsh]
-    #[arg(long, value_enum, value_name = "MESHER")]
-    pub hand_off: Option<ExportTarget>,
+    /// Meshers to which results are handed: gmsh writes atlas.msh and remesh.geo; mmg writes mmg/surface.mesh for mmgs and
+    /// mmg/chart-NNN.mesh for mmg2d; with a comma between them, or none [default: gmsh]
+    #[arg(long, value_name = "gmsh,mmg")]
+    pub hand_off: Option<ExportTargets>,
     /// Write these files for other programs, too: obj (surface.obj) and glb (surface.glb), with texture coordinates; welded
     /// (welded.vtu), with one node where charts meet; with commas between them, or none [default: none]
     #[arg(long, value_name = "obj,glb,welded")]

@@ -39,6 +39,17 @@ pub const SURFACE_GLB: &str = "surface.glb";
 /// The surface with one node where charts meet: where `--also welded` asks for it.
 pub const WELDED: &str = "welded.vtu";
 
+/// The surface for mmgs, with its sizes: where `--hand-off mmg` asks for it.
+pub const MMG_SURFACE: &str = "mmg/surface.mesh";
+
+/// See [`MMG_SURFACE`].
+pub const MMG_SURFACE_SIZES: &str = "mmg/surface.sol";
+
+/// The plane of a chart for mmg2d, and its metric.
+pub fn mmg_chart(chart: usize) -> [String; 2] {
+    [format!("mmg/chart-{chart:03}.mesh"), format!("mmg/chart-{chart:03}.sol")]
+}
+
 /// What `planish check --mesh` found; written later than the result.
 pub const MESH: &str = "mesh.json";
 

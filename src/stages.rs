@@ -7,7 +7,7 @@ use crate::report::{
     self, CertifiedFacts, Decomposition, Facts, Input, Output, RefusedComponent, Report, SurfaceFacts,
 };
 use crate::result_files;
-use crate::settings::{self, Also, Settings};
+use crate::settings::{Also, ExportTarget, Settings};
 use planish_core::atlas::Atlas;
 use planish_core::fem::sparse;
 use planish_core::map::linear;
@@ -167,8 +167,10 @@ pub enum Encoding {
     Beside,
     /// A file for another program.
     Also(Also),
-    /// What a mesher gets.
+    /// What Gmsh gets.
     HandOff,
+    /// What Mmg gets.
+    Mmg,
 }
 
 /// What a kind of files came to.
@@ -178,16 +180,21 @@ pub struct Encoded {
     files: Files,
     /// What the report says of them.
     outputs: Vec<Output>,
-    /// The account of the hand-off.
+    /// The account of the hand-off to Gmsh.
     hand_off: Option<report::ExportReport>,
+    /// That of the one to Mmg.
+    mmg: Option<report::MmgReport>,
 }
 
 /// What a result consists of, in the order of its files.
 pub fn encodings(settings: &Settings) -> Vec<Encoding> {
     let mut encodings = vec![Encoding::Surface, Encoding::Param, Encoding::Beside];
     encodings.extend(settings.also.iter().map(|also| Encoding::Also(*also)));
-    if settings.hand_off == settings::ExportTarget::Gmsh {
+    if settings.hand_off.has(ExportTarget::Gmsh) {
         encodings.push(Encoding::HandOff);
+    }
+    if settings.hand_off.has(ExportTarget::Mmg) {
+        encodings.push(Encoding::Mmg);
     }
     encodings
 }
@@ -204,27 +211,33 @@ pub fn encode(
     settings: &Settings,
     monitor: &dyn Monitor,
 ) -> Result<Encoded, Abort> {
-    let (files, hand_off) = match encoding {
-        Encoding::Surface => (vec![(result_files::SURFACE.to_owned(), vtu::surface(atlas, labels))], None),
-        Encoding::Param => (vec![(result_files::PARAM.to_owned(), vtu::param(atlas, labels))], None),
-        Encoding::Beside => (encode_beside(atlas, labels)?, None),
-        Encoding::Also(also) => (vec![encode_also(also, atlas, labels)?], None),
+    let mut encoded = Encoded::default();
+    encoded.files = match encoding {
+        Encoding::Surface => vec![(result_files::SURFACE.to_owned(), vtu::surface(atlas, labels))],
+        Encoding::Param => vec![(result_files::PARAM.to_owned(), vtu::param(atlas, labels))],
+        Encoding::Beside => encode_beside(atlas, labels)?,
+        Encoding::Also(also) => vec![encode_also(also, atlas, labels)?],
         Encoding::HandOff => {
-            let export = hand_off(atlas, labels, settings, monitor)?;
-            (export.files, Some(export.report))
+            let export = export::gmsh(atlas, &wanted(atlas, labels, settings), monitor).map_err(unwanted)?;
+            encoded.hand_off = Some(export.report);
+            export.files
+        }
+        Encoding::Mmg => {
+            let export = export::mmg(atlas, &wanted(atlas, labels, settings), monitor).map_err(unwanted)?;
+            encoded.mmg = Some(export.report);
+            export.files
         }
     };
-    let outputs = files.iter().map(|(name, content)| Output::of(name, content)).collect();
-    Ok(Encoded { files, outputs, hand_off })
+    encoded.outputs = encoded.files.iter().map(|(name, content)| Output::of(name, content)).collect();
+    Ok(encoded)
 }
 
-/// What a mesher gets, as the settings say.
-fn hand_off(
-    atlas: &CertifiedAtlas,
-    labels: &[Label],
-    settings: &Settings,
-    monitor: &dyn Monitor,
-) -> Result<export::Export, Abort> {
+fn unwanted(Interrupted: Interrupted) -> Abort {
+    Abort::Unwanted
+}
+
+/// What a mesher is asked for, as the settings say.
+fn wanted<'a>(atlas: &CertifiedAtlas, labels: &'a [Label], settings: &Settings) -> export::Wanted<'a> {
     let least = settings.size_min.unwrap_or(0.0);
     let size = settings.size.unwrap_or_else(|| atlas.mesh().default_size().max(least));
     let features = settings.feature_angle.filter(|_| settings.names_features);
@@ -235,8 +248,7 @@ fn hand_off(
         deviation: settings.deviation,
         gradation: settings.gradation,
     };
-    let wanted = export::Wanted { sizes, labels, features, order: settings.mesh_order };
-    export::gmsh(atlas, &wanted, monitor).map_err(|Interrupted| Abort::Unwanted)
+    export::Wanted { sizes, labels, features, ridges: settings.feature_angle, order: settings.mesh_order }
 }
 
 /// What is known of an atlas of which all files are `encoded`, in the order of [`encodings`], and these. `whole` is how many charts
@@ -247,11 +259,12 @@ pub fn assemble(
     labels: &[Label],
     encoded: Vec<Encoded>,
 ) -> (CertifiedFacts, Files) {
-    let (mut files, mut outputs, mut hand_off) = (Files::new(), Vec::new(), None);
+    let (mut files, mut outputs, mut hand_off, mut mmg) = (Files::new(), Vec::new(), None, None);
     for one in encoded {
         files.extend(one.files);
         outputs.extend(one.outputs);
         hand_off = hand_off.or(one.hand_off);
+        mmg = mmg.or(one.mmg);
     }
     let facts = CertifiedFacts {
         labels: report::labels(atlas, labels),
@@ -259,6 +272,7 @@ pub fn assemble(
         charts_by_splitting: atlas.charts().len() - whole,
         seams: report::seams(atlas.seams()),
         hand_off,
+        mmg,
         outputs,
     };
     (facts, files)

@@ -33,7 +33,8 @@
 //! 4. [`MappedChart::untangle`] makes the triangles valid ([`mod@untangle`]) while keeping the Dirichlet energy as low as it can
 //!    be, and proves the result one-to-one ([`certify`]): a [`CertifiedChart`].
 //! 5. [`CertifiedAtlas::gather`] puts the charts together, and finds the [curves](seams) between them.
-//! 6. [`mod@subdivide`] makes linear triangulations of an atlas, for meshers; [`evaluate`] goes from space to the plane and back;
+//! 6. [`mod@subdivide`] makes linear triangulations of an atlas, for meshers that know of charts, [`planar`] meshes of their planes
+//!    for those that do not; [`evaluate`] goes from space to the plane and back;
 //!    [`soundness`] tells whether a mesh that was made through them is any good.
 //!
 //! # What is promised
@@ -71,6 +72,7 @@ pub mod measure;
 pub mod mesh;
 pub mod monitor;
 pub mod parametrize;
+pub mod planar;
 mod refine;
 pub mod repair;
 pub mod seams;

@@ -1,7 +1,7 @@
 //! The hand-off to Gmsh: `atlas.msh` and `remesh.geo`, with the edge length that the script asks for.
 
 use super::groups::groups;
-use super::sizes::{Varying, varying};
+use super::sizes::{Seams, Varying, varying};
 use super::{Sizes, Wanted};
 use crate::formats::gmsh;
 use crate::report::{ExportReport, HeldPlace};
@@ -80,7 +80,7 @@ pub fn gmsh(atlas: &CertifiedAtlas, wanted: &Wanted, monitor: &dyn Monitor) -> R
     };
     let distortions = distortions_of_written(charts, &natural, &linear);
     let algorithms = algorithms(charts, &linear, &distortions, size);
-    let varying = varying(atlas, &linear, &algorithms, wanted);
+    let varying = varying(atlas, linear.curvatures(), Seams::Kept { adapted: &algorithms.adapted }, wanted);
     let mut report = counted(report, &linear, &algorithms, &varying);
     if let Some(held) = varying.held.first() {
         report.warning.get_or_insert_with(|| held_up(&wanted.sizes, &varying, held));

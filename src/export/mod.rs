@@ -2,11 +2,13 @@
 
 mod gmsh;
 mod groups;
+mod mmg;
 mod narrow;
 mod sizes;
 
 use crate::formats::Label;
 pub use gmsh::{Export, gmsh};
+pub use mmg::{MmgExport, mmg};
 
 /// What a mesher shall be asked for.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +19,8 @@ pub struct Wanted<'a> {
     pub labels: &'a [Label],
     /// The dihedral angle of features, in degrees, where curves along these are to have a name.
     pub features: Option<f64>,
+    /// The dihedral angle of ridges, in degrees, where a mesher is told of these.
+    pub ridges: Option<f64>,
     /// The order of the elements: 1 or 2.
     pub order: u8,
 }

@@ -2,13 +2,13 @@
 
 use super::narrow::{self, Places};
 use super::{Sizes, Wanted};
-use crate::formats::gmsh::{Algorithms, SizedTriangle};
+use crate::formats::gmsh::SizedTriangle;
 use planish_core::CertifiedAtlas;
 use planish_core::measure::bends::bends;
+use planish_core::measure::curvature::Principal;
 use planish_core::measure::sizes::{SizeField, SizedCube, SizedPlace, TOLD_UP_TO};
 use planish_core::measure::spikes::spikes;
 use planish_core::mesh::SurfaceMesh;
-use planish_core::subdivide::LinearAtlas;
 use planish_core::topology::VertexId;
 use planish_core::vec3::Vec3;
 use std::f64::consts::PI;
@@ -52,16 +52,28 @@ const FLOORS: [f64; 2] = [1.0 / 16.0, 1.0 / 4.0];
 /// So many of the places are told where smaller elements are needed than may be.
 const TOLD: usize = 8;
 
-/// The sizes of a mesh that is wanted.
+/// What a mesher does at seams.
+#[derive(Clone, Copy)]
+pub(super) enum Seams<'a> {
+    /// It has nodes along them, so that narrow charts need small elements. Some charts, ascending, are made by Gmsh's MeshAdapt.
+    Kept { adapted: &'a [usize] },
+    /// It knows of none.
+    Passed,
+}
+
+/// The sizes of a mesh that is wanted. `curvatures` are those of the vertices of the surface; more may follow.
 pub(super) fn varying(
     atlas: &CertifiedAtlas,
-    linear: &LinearAtlas,
-    algorithms: &Algorithms,
+    curvatures: &[Principal],
+    seams: Seams,
     wanted: &Wanted,
 ) -> Varying {
     let (mesh, charts, sizes) = (atlas.mesh(), atlas.charts(), &wanted.sizes);
-    let Places { sized, curves, gaps } = narrow::places(mesh, charts, atlas.seams(), &algorithms.adapted, sizes.size);
-    let thin = spikes(mesh, charts, linear.curvatures(), sizes.size);
+    let Places { sized, curves, gaps } = match seams {
+        Seams::Kept { adapted } => narrow::places(mesh, charts, atlas.seams(), adapted, sizes.size),
+        Seams::Passed => Places::default(),
+    };
+    let thin = spikes(mesh, charts, curvatures, sizes.size);
     let counts = Varying { narrow_curves: curves, narrow_places: gaps, spikes: thin.len(), ..Varying::default() };
     let mut needed = sized;
     needed.extend(thin.iter().map(|s| SizedPlace { at: s.centre, size: s.size, reach: s.radius }));
@@ -169,8 +181,8 @@ mod tests {
     fn found(atlas: &CertifiedAtlas, size: f64, min: f64, expected: impl Fn(f64) -> f64) -> Varying {
         let linear = subdivide(atlas, &vec![None; atlas.charts().len()]).expect("triangles");
         let sizes = Sizes { size, min, per_turn: None, deviation: None, gradation: 0.4 };
-        let wanted = Wanted { sizes, labels: &[], features: None, order: 1 };
-        let found = varying(atlas, &linear, &Algorithms { adapted: vec![], enlarged: 1.0 }, &wanted);
+        let wanted = Wanted { sizes, labels: &[], features: None, order: 1, ridges: None };
+        let found = varying(atlas, linear.curvatures(), Seams::Kept { adapted: &[] }, &wanted);
         let mesh = atlas.mesh();
         let of_input = (0..mesh.points().len()).filter(|v| mesh.input_vertex(VertexId::at(*v)).is_some());
         let mut asked = 0;

@@ -5,7 +5,7 @@ use planish_core::topology::VertexId;
 use planish_core::vec3::Vec3;
 
 /// The vertices of a surface, each once, in the order in which the file has them; those that were added come last.
-pub(super) struct JoinedVertices {
+pub struct JoinedVertices {
     points: Vec<Vec3>,
     /// Per vertex, a copy of it in the surface.
     copies: Vec<VertexId>,

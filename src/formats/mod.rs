@@ -8,7 +8,7 @@ mod joined;
 mod labels;
 pub mod layout;
 mod location;
-mod medit;
+pub mod medit;
 mod msh;
 #[cfg(test)]
 #[path = "../../tests/fuzz/mutate/mod.rs"]
@@ -32,6 +32,7 @@ use crate::outcome::{Code, Reason};
 pub use crate::settings::{LabelSource, Limits};
 pub use content::{Content, NoSiblings, Notes, SiblingFiles, Source, TooMany};
 pub use gltf::glb;
+pub use joined::JoinedVertices;
 pub use labels::{Label, LabelError, label_index};
 use location::Location;
 pub use obj::surface as surface_obj;

@@ -2,6 +2,7 @@
 
 use crate::input::{Folder as Siblings, read_file};
 use crate::outcome::{Code, Reason, Status};
+use crate::output::listed;
 use crate::report::{Input, Output, RefusedComponent, Report, SCHEMA, VERSION};
 use crate::result_files;
 use crate::settings::Settings;
@@ -61,7 +62,7 @@ pub fn holds(folder: &Path, output: &Output) -> Result<bool, OpenError> {
 }
 
 fn holds_in<F: Folder>(folder: &F, output: &Output) -> Result<bool, OpenError> {
-    let file = folder.follow_file(&output.file)?;
+    let file = listed::open_file(folder, &output.file)?;
     if file.stat()?.bytes != output.bytes {
         return Ok(false);
     }

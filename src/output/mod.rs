@@ -4,6 +4,7 @@
 pub mod begun;
 pub mod free_space;
 pub mod ledger;
+pub mod listed;
 pub mod own;
 pub mod publish;
 pub mod replace;

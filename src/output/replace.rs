@@ -3,13 +3,13 @@
 //! A folder is a result if its report.json is one of planish's. What the report names in it is planish's, and goes; what
 //! commands wrote there, or people put there, is not ours, and moves on into the newer result.
 
+use super::listed::Listed;
 use crate::report;
 use crate::result_files;
 use crate::system::disk::{self, File, Folder, Kind, Rename, Stat};
 use crate::system::passing;
 use crate::system::safe_open::{self, OpenError};
 use serde::Deserialize;
-use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -33,17 +33,14 @@ struct Known {
 ///
 /// # Errors
 /// A system in trouble, which says nothing about the folder.
-pub fn own_files<F: Folder>(folder: &F) -> io::Result<Option<BTreeSet<OsString>>> {
+pub fn own_files<F: Folder>(folder: &F) -> io::Result<Option<Listed>> {
     let text = folder.open_file(result_files::REPORT).and_then(|file| safe_open::read(&file, LONGEST));
     let text = match text {
         Err(OpenError::Io(error)) if passing::passes(&error) => return Err(error),
         text => text.ok(),
     };
     let report: Option<Known> = text.and_then(|text| serde_json::from_slice(&text).ok());
-    let Some(report) = report else { return Ok(None) };
-    let mut own: BTreeSet<OsString> = report.outputs.into_iter().map(|output| output.file.into()).collect();
-    own.extend(result_files::BESIDE_OUTPUTS.map(OsString::from));
-    Ok(Some(own))
+    Ok(report.map(|report| Listed::of(report.outputs)))
 }
 
 /// Why what is not planish's cannot be kept.
@@ -64,16 +61,50 @@ pub enum NotKept {
 pub fn keep_foreign<F: Folder>(
     older: &F,
     at: &Path,
-    own: &BTreeSet<OsString>,
+    own: &Listed,
     (fresh, desk): (&F, &F),
     again: bool,
 ) -> Result<usize, NotKept> {
     let mut kept = 0;
     for name in names(older, at)? {
-        if !own.contains(&name) {
-            kept += keep(older, at, &name, (fresh, desk), again)?;
+        match own.folder(&name) {
+            Some(inside) if is_folder(older, at, &name)? => {
+                kept += keep_in_own(older, at, &name, &inside, (fresh, desk), again)?;
+            }
+            _ if own.has(&name) => {}
+            _ => kept += keep(older, at, &name, (fresh, desk), again)?,
         }
     }
+    Ok(kept)
+}
+
+fn is_folder<F: Folder>(folder: &F, at: &Path, name: &OsStr) -> Result<bool, NotKept> {
+    folder.stat_of(name).map(|found| found.is_folder()).map_err(|e| NotKept::Io(at.join(name), e))
+}
+
+/// As [`keep_foreign`], in a folder of planish's, which the newer result need not have.
+fn keep_in_own<F: Folder>(
+    older: &F,
+    at: &Path,
+    name: &OsStr,
+    own: &Listed,
+    (fresh, desk): (&F, &F),
+    again: bool,
+) -> Result<usize, NotKept> {
+    let path = at.join(name);
+    let failed = |error| NotKept::Io(path.clone(), error);
+    let from = older.open_folder(name).map_err(failed)?;
+    if own.is_all_of(&from).map_err(failed)? {
+        return Ok(0);
+    }
+    match fresh.make_folder(name, disk::OPEN_FOLDER) {
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(failed(error)),
+        Err(_) if !is_folder(fresh, at, name)? => return Err(NotKept::Stands(path)),
+        Ok(()) | Err(_) => {}
+    }
+    let to = fresh.open_folder(name).map_err(failed)?;
+    let kept = keep_foreign(&from, &path, own, (&to, desk), again)?;
+    to.sync().map_err(failed)?;
     Ok(kept)
 }
 
@@ -107,7 +138,7 @@ fn keep<F: Folder>(older: &F, at: &Path, name: &OsStr, (fresh, desk): (&F, &F), 
         let from = older.open_folder(name).map_err(failed)?;
         let to = fresh.open_folder(name).map_err(failed)?;
         // Nothing in there is planish's.
-        let inside = keep_foreign(&from, &path, &BTreeSet::new(), (&to, desk), again)?;
+        let inside = keep_foreign(&from, &path, &Listed::default(), (&to, desk), again)?;
         let is_complete = to.stat().map_err(failed)?.mode == found.mode_of_copy();
         if is_new || inside > 0 || !is_complete {
             complete(&found, &to).map_err(failed)?;
@@ -221,7 +252,7 @@ mod tests {
         write(&format!(
             r#"{{"schema": 9, "planish": "7.1", "status": "certified", "outputs": [{output}], "more": 1}}"#
         ));
-        let names: Vec<_> = own_files().expect("a result").into_iter().collect();
+        let names: Vec<_> = own_files().expect("a result").files().cloned().collect();
         let finer = result_files::FINER;
         assert_eq!(names, [&finer[..], &["hooks.json", "mesh.json", "report.json", "surface.vtu"]].concat());
     }
@@ -237,7 +268,7 @@ mod tests {
         }
         std::os::unix::fs::symlink("/etc", older.join("link")).expect("linked");
         fs::set_permissions(older.join("notes"), fs::Permissions::from_mode(0o2750)).expect("set");
-        let own = BTreeSet::from(["ours.vtu".into()]);
+        let own = Listed::of(vec![report::Output::of("ours.vtu", b"")]);
         let keep_foreign = |again| {
             let [from, to, desk] =
                 [older.as_path(), &fresh, place.path()].map(|path| System.open(path).expect("there"));

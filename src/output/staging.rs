@@ -10,13 +10,13 @@
 //! What lies at `older`, or at `whole` and is not the result that was made there, may hold what is not planish's: it is
 //! **settled** before a desk is cleared ([`Desk::settle`]), by the one who published, or at the next start.
 
+use crate::output::listed::Listed;
 use crate::output::own;
-use crate::output::publish::{Content, PublishError, STAGING, at};
+use crate::output::publish::{PublishError, STAGING, at};
 use crate::output::replace::{self, NotKept};
 use crate::result_files;
-use crate::system::disk::{self, Disk, File as _, Folder, OPEN_FILE, OPEN_FOLDER, Rename};
+use crate::system::disk::{self, Disk, File as _, Folder, OPEN_FOLDER, Rename};
 use crate::system::escape::escape;
-use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::io::{self, ErrorKind};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
@@ -292,7 +292,7 @@ impl<F: Folder> Desk<F> {
         &self,
         older: &F,
         target: &Path,
-        own: &BTreeSet<OsString>,
+        own: &Listed,
         fresh: &F,
         again: bool,
     ) -> Result<(), PublishError> {
@@ -393,7 +393,7 @@ impl<F: Folder> Desk<F> {
         disk: &D,
         out: &Path,
         promise: &Promise,
-        own: Option<&BTreeSet<OsString>>,
+        own: Option<&Listed>,
     ) -> Result<Settled, PublishError> {
         let above = promise.name.parent().unwrap_or(Path::new(""));
         let mut settled = Settled::Newer;
@@ -430,7 +430,7 @@ impl<F: Folder> Desk<F> {
         folder: &F,
         promise: &Promise,
         target: &Path,
-        own: Option<&BTreeSet<OsString>>,
+        own: Option<&Listed>,
     ) -> Result<Settled, PublishError> {
         let name = target.file_name().unwrap_or_default();
         let found = match folder.stat_of(name) {
@@ -460,7 +460,7 @@ impl<F: Folder> Desk<F> {
         aside: &str,
         folder: &F,
         target: &Path,
-        own: Option<&BTreeSet<OsString>>,
+        own: Option<&Listed>,
     ) -> Result<(), PublishError> {
         let foreign = || PublishError::Foreign(target.to_owned());
         let name = target.file_name().unwrap_or_default();
@@ -525,24 +525,11 @@ impl<F: Folder> Desk<F> {
     }
 }
 
-/// Writes the files of a result, and brings them to disk.
-///
-/// # Errors
-/// Those of the system.
-pub fn write_all<F: Folder>(half: &F, files: &[Content]) -> io::Result<()> {
-    for (name, bytes) in files {
-        let file = half.make_file(name, OPEN_FILE)?;
-        file.append(bytes)?;
-        file.sync()?;
-    }
-    half.sync()
-}
-
 /// Whether a result holds nothing but what planish wrote.
 fn holds_only_own<F: Folder>(folder: &F, name: &OsStr) -> io::Result<bool> {
     let result = folder.open_folder(name)?;
     let own = replace::own_files(&result)?.unwrap_or_default();
-    Ok(result.list()?.iter().all(|name| own.contains(name)))
+    own.is_all_of(&result)
 }
 
 fn is_taken(error: &io::Error) -> bool {

@@ -5,13 +5,13 @@
 //! stays, and with it the folder. All is done in folders that are open, with no link on the way: so nothing outside the
 //! output folder goes, and nothing of a newer result that takes the place of this one meanwhile.
 
+use crate::output::listed::Listed;
 use crate::output::replace;
 use crate::result_files;
 use crate::system::disk::{self, Disk, Folder, System};
-use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::io::{self, ErrorKind};
-use std::path::{Component, Path};
+use std::path::Path;
 
 /// Why a result is not removed.
 #[derive(Debug, thiserror::Error)]
@@ -32,7 +32,7 @@ pub struct Standing<F: Folder = <System as Disk>::Folder> {
     /// The name of its folder there.
     name: OsString,
     folder: F,
-    own: BTreeSet<OsString>,
+    own: Listed,
 }
 
 impl Standing {
@@ -56,8 +56,6 @@ impl<F: Folder> Standing<F> {
         let above = disk::below(disk.open(out)?, above).map_err(|_| WithdrawError::NoResult)?;
         let folder = above.open_folder(&last).map_err(|_| WithdrawError::NoResult)?;
         let own = replace::own_files(&folder)?.ok_or(WithdrawError::NoResult)?;
-        // A report may say anything: only names are taken from it, no ways to other folders.
-        let own = own.into_iter().filter(|file| is_name(Path::new(file))).collect();
         Ok(Self { above, name: last, folder, own })
     }
 
@@ -66,7 +64,7 @@ impl<F: Folder> Standing<F> {
     /// # Errors
     /// The folder cannot be read.
     pub fn holds_foreign(&self) -> io::Result<bool> {
-        Ok(self.folder.list()?.iter().any(|name| !self.own.contains(name)))
+        Ok(!self.own.is_all_of(&self.folder)?)
     }
 
     /// Removes what planish has written; whether nothing else was there, so that the folder is gone, too.
@@ -74,36 +72,20 @@ impl<F: Folder> Standing<F> {
     /// # Errors
     /// The system refuses; some of it may be gone then, but not the report.
     pub fn remove(self) -> io::Result<bool> {
-        for file in self.own.iter().filter(|file| *file != result_files::REPORT) {
-            match self.folder.stat_of(file) {
-                Err(error) if error.kind() == ErrorKind::NotFound => {}
-                // A folder of that name is somebody else's.
-                Ok(found) if found.is_folder() => {}
-                found => found.and_then(|_| self.folder.unlink(file))?,
-            }
-        }
+        self.own.remove(&self.folder, result_files::REPORT)?;
         self.folder.unlink(result_files::REPORT)?;
         match self.above.remove_folder(&self.name) {
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(true),
-            Err(error) if is_full(&error) => Ok(false),
+            Err(error) if disk::is_full(&error) => Ok(false),
             removed => removed.map(|()| true),
         }
     }
 }
 
-fn is_full(error: &io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists)
-}
-
-/// Whether this is the name of something in a folder, and not a way to somewhere else.
-fn is_name(name: &Path) -> bool {
-    let mut parts = name.components();
-    matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::listed;
     use std::fs;
     use std::os::unix::fs::symlink;
 
@@ -115,7 +97,7 @@ mod tests {
         let outputs: Vec<String> = files.iter().map(output).collect();
         let report = r#"{"schema": 1, "planish": "1", "status": "certified", "outputs": ["#.to_owned();
         fs::write(folder.join(result_files::REPORT), report + &outputs.join(",") + "]}").expect("written");
-        for file in files.iter().filter(|file| is_name(Path::new(file))) {
+        for file in files.iter().filter(|file| listed::place(file).is_some_and(|(folder, _)| folder.is_none())) {
             fs::write(folder.join(file), "x").expect("written");
         }
     }

@@ -2,7 +2,7 @@
 //! the end. So a report never holds what a stage that broke down has left behind.
 
 use super::{
-    ChartReport, Decomposition, ExportReport, Input, LabelReport, Output, Refinement, RefusedComponent, Repairs,
+    ChartReport, Decomposition, ExportReport, Input, LabelReport, MmgReport, Output, Refinement, RefusedComponent, Repairs,
     Report, Seams, Surface, Warning,
 };
 use crate::formats::Notes;
@@ -51,6 +51,8 @@ pub struct CertifiedFacts {
     pub seams: Seams,
     /// What was handed to a mesher; none where that was not asked for.
     pub hand_off: Option<ExportReport>,
+    /// What was handed to Mmg; none where that was not asked for.
+    pub mmg: Option<MmgReport>,
     /// The files of the result.
     pub outputs: Vec<Output>,
 }
@@ -94,11 +96,11 @@ impl Facts {
 
     /// The report of an input that is certified, but for components that are refused.
     pub fn certified(self, settings: &Settings, certified: CertifiedFacts) -> Report {
-        let CertifiedFacts { labels, charts, charts_by_splitting, seams, hand_off, outputs } = certified;
+        let CertifiedFacts { labels, charts, charts_by_splitting, seams, hand_off, mmg, outputs } = certified;
         let report = self.report(settings);
         let decomposition = report.decomposition.map(|d| Decomposition { charts_by_splitting, ..d });
         let status = Status::Certified;
-        Report { status, decomposition, labels, charts, seams, hand_off, outputs, ..report }
+        Report { status, decomposition, labels, charts, seams, hand_off, mmg, outputs, ..report }
     }
 
     /// The report of an input that is refused, or failed, for this reason.

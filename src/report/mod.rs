@@ -63,6 +63,9 @@ pub struct Report {
     pub seams: Seams,
     /// The hand-off to a mesher; null where there was none to be made.
     pub hand_off: Option<ExportReport>,
+    /// The hand-off to Mmg; none where it was not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mmg: Option<MmgReport>,
     /// The other files of the result.
     pub outputs: Vec<Output>,
     /// CPU seconds per stage: the only part that differs from run to run.
@@ -105,8 +108,8 @@ pub struct ResultSettings {
     pub max_area_ratio: f64,
     /// Largest number of triangles of a chart; null: any.
     pub max_triangles: Option<usize>,
-    /// Mesher to which the result is handed.
-    pub hand_off: settings::ExportTarget,
+    /// Meshers to which the result is handed.
+    pub hand_off: settings::ExportTargets,
     /// Files for other programs, beside those of every result.
     #[serde(default)]
     pub also: Vec<settings::Also>,
@@ -652,6 +655,38 @@ pub struct ExportReport {
     pub failure: Option<String>,
 }
 
+/// What was handed to Mmg.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MmgReport {
+    /// The edge length that it is asked for, in the unit of the input.
+    pub size: f64,
+    /// What `-hausd` of mmgs should be, in the unit of the input.
+    pub hausdorff: f64,
+    /// The least edge length that mmgs is asked for; null where all are alike.
+    pub least_size: Option<f64>,
+    /// Whether mmgs should look for ridges itself; if not, give it `-nr`.
+    pub detects_ridges: bool,
+    /// Edges that it is told of as ridges.
+    pub ridges: usize,
+    /// Vertices at which these end, meet or turn.
+    pub corners: usize,
+    /// The references of named parts; empty where there are none.
+    pub references: Vec<Reference>,
+    /// The charts that are handed to mmg2d: all, or none.
+    pub charts: usize,
+    /// Why there are no charts for mmg2d.
+    pub failure: Option<String>,
+}
+
+/// The reference of triangles of a named part.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reference {
+    /// The number.
+    pub reference: i32,
+    /// The name of the part.
+    pub name: String,
+}
+
 /// A place where smaller elements are needed than may be.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldPlace {
@@ -710,6 +745,7 @@ impl Report {
             charts: vec![],
             seams: Seams::default(),
             hand_off: None,
+            mmg: None,
             outputs: vec![],
             timing: BTreeMap::new(),
         }

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 pub use template::{Part, Placeholder, Template, TemplateError};
 pub use values::{
-    Also, AlsoFiles, Boundary, ExportTarget, FeatureAngle, Inputs, LabelSource, Log, Off, RawCommand, RawLimits,
+    Also, AlsoFiles, Boundary, ExportTarget, ExportTargets, FeatureAngle, Inputs, LabelSource, Log, Off, RawCommand, RawLimits,
     Refine, Refused,
 };
 
@@ -49,7 +49,7 @@ pub struct RawSettings {
     pub max_triangles: Option<usize>,
     /// Meshers to which results are handed.
     #[serde(rename = "hand-off")]
-    pub hand_off: Option<ExportTarget>,
+    pub hand_off: Option<ExportTargets>,
     /// Files for other programs, beside those of every result.
     pub also: Option<AlsoFiles>,
     /// Edge length of the mesh to be made.
@@ -145,7 +145,7 @@ pub struct Settings {
     /// Largest number of triangles of a chart; none: any.
     pub max_triangles: Option<usize>,
     /// Meshers to which results are handed.
-    pub hand_off: ExportTarget,
+    pub hand_off: ExportTargets,
     /// Files for other programs, beside those of every result: each once, in their order.
     pub also: Vec<Also>,
     /// Edge length of the mesh to be made, in the unit of the input; without it, one is chosen.

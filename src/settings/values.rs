@@ -16,15 +16,92 @@ pub enum Log {
     Json,
 }
 
-/// The meshers to which results are handed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "snake_case")]
+/// A mesher to which results are handed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExportTarget {
     /// Gmsh: atlas.msh and remesh.geo.
-    #[default]
     Gmsh,
-    /// None.
-    None,
+    /// Mmg: surface.mesh for mmgs, and chart-NNN.mesh for mmg2d, in the folder mmg.
+    Mmg,
+}
+
+/// The meshers to which results are handed: words with commas between them, or `none`.
+///
+/// ```
+/// use planish::settings::{ExportTarget, ExportTargets};
+///
+/// let both: ExportTargets = "mmg,gmsh".parse()?;
+/// assert!(both.has(ExportTarget::Gmsh) && both.has(ExportTarget::Mmg));
+/// assert_eq!(both.to_string(), "gmsh,mmg", "in an order of their own");
+/// assert_eq!("none".parse::<ExportTargets>()?.to_string(), "none");
+/// assert_eq!("netgen".parse::<ExportTargets>(), Err("netgen is none of gmsh, mmg and none".to_owned()));
+/// # Ok::<(), String>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct ExportTargets {
+    gmsh: bool,
+    mmg: bool,
+}
+
+impl ExportTargets {
+    /// Whether this mesher is among them.
+    pub fn has(self, target: ExportTarget) -> bool {
+        match target {
+            ExportTarget::Gmsh => self.gmsh,
+            ExportTarget::Mmg => self.mmg,
+        }
+    }
+}
+
+impl Default for ExportTargets {
+    fn default() -> Self {
+        Self { gmsh: true, mmg: false }
+    }
+}
+
+impl std::str::FromStr for ExportTargets {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut targets = Self { gmsh: false, mmg: false };
+        if text == "none" {
+            return Ok(targets);
+        }
+        for word in text.split(',') {
+            match word {
+                "gmsh" => targets.gmsh = true,
+                "mmg" => targets.mmg = true,
+                _ => return Err(format!("{word} is none of gmsh, mmg and none")),
+            }
+        }
+        Ok(targets)
+    }
+}
+
+impl std::fmt::Display for ExportTargets {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match (self.gmsh, self.mmg) {
+            (true, true) => "gmsh,mmg",
+            (true, false) => "gmsh",
+            (false, true) => "mmg",
+            (false, false) => "none",
+        })
+    }
+}
+
+impl From<ExportTargets> for String {
+    fn from(targets: ExportTargets) -> Self {
+        targets.to_string()
+    }
+}
+
+impl TryFrom<String> for ExportTargets {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
 }
 
 /// A file for other programs, beside those of every result.

@@ -10,7 +10,7 @@ use crate::formats::layout::Placement;
 use crate::formats::vtu::{self, Grid};
 use crate::input::read_file;
 use crate::outcome::{Reason, Status};
-use crate::output::ledger;
+use crate::output::{ledger, listed};
 use crate::report::{self, ChartReport, Output, Report, certificate, chart_checksum};
 use crate::result_files;
 use crate::settings::ExportTarget;
@@ -163,7 +163,7 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
 fn expected_files(report: &Report) -> Vec<&'static str> {
     let mut expected = REQUIRED.to_vec();
     expected.extend(report.settings.also.iter().map(|also| stages::also_file(*also)));
-    let is_asked_for = report.settings.hand_off == ExportTarget::Gmsh;
+    let is_asked_for = report.settings.hand_off.has(ExportTarget::Gmsh);
     let has_failed = report.hand_off.as_ref().is_some_and(|hand_off| hand_off.failure.is_some());
     if is_asked_for && !has_failed {
         expected.extend(HANDED_OFF);
@@ -179,9 +179,9 @@ fn expected_files(report: &Report) -> Vec<&'static str> {
 
 /// Size and hash of one file.
 fn check_output(folder: &Path, output: &Output) -> Result<(), Finding> {
-    // Names come from the report: only plain ones are opened.
-    if Path::new(&output.file).file_name() != Some(output.file.as_ref()) {
-        return Err(file(&output.file, "is no plain file name"));
+    // Names come from the report: only those of files in the result are opened.
+    if listed::place(&output.file).is_none() {
+        return Err(file(&output.file, "is no name of a file in the result"));
     }
     match ledger::holds(folder, output) {
         Ok(true) => Ok(()),

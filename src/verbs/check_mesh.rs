@@ -125,7 +125,7 @@ fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<Mesh
     // Files are large, and one is done with before the next: they share their memory.
     let mut bytes = Vec::new();
     let (surface_file, surface, charts) = surface(folder, &report, &mut bytes)?;
-    let size = question.size.or(report.hand_off.as_ref().map(|h| h.size)).ok_or(Unjudged::NoSize)?;
+    let size = question.size.or(size_asked_for(&report)).ok_or(Unjudged::NoSize)?;
     read_file_into(&question.mesh, &mut bytes).map_err(|reason| Unjudged::Told(reason.message))?;
     let patches = decode(&question.mesh, &bytes, settings).map_err(|reason| Unjudged::Told(reason.message))?;
     let name = question.mesh.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
@@ -140,6 +140,11 @@ fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<Mesh
         told.held = finer::ask(folder, &report, &surface, deviation).map_err(Unjudged::Told)?;
     }
     Ok(judged)
+}
+
+/// The edge length that meshers are asked for.
+fn size_asked_for(report: &Report) -> Option<f64> {
+    report.hand_off.as_ref().map(|gmsh| gmsh.size).or(report.mmg.as_ref().map(|mmg| mmg.size))
 }
 
 /// The surface of a result, as it was published, and the chart of each triangle.

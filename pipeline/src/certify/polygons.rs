@@ -5,6 +5,7 @@
 //! and 0 elsewhere.
 
 use super::sides::{Joint, Side, first_found, only_left, sides_of};
+use crate::evaluate::Bvh;
 use crate::grid::{GridPoint, orientation};
 use crate::vec3::BoundingBox;
 use num_bigint::BigInt;
@@ -58,6 +59,19 @@ pub fn check(loops: &[Vec<GridPoint>]) -> Option<Wrong> {
     };
     let mut holes = (0..loops.len()).filter(|i| *i != outer);
     holes.find(|hole| is_misplaced(loops, outer, *hole)).map(Wrong::Nesting)
+}
+
+/// All pairs of sides that share a point other than the end that neighbours have in common.
+pub(crate) fn crossings(loops: &[Vec<GridPoint>]) -> Vec<[Side; 2]> {
+    let sides = sides_of(loops);
+    let mut found = Vec::new();
+    Bvh::new(sides.iter().map(|s| around(ends(loops, *s)))).pairs(|s, t| {
+        let [s, t] = [s, t].map(|side| sides[side as usize]);
+        if clash(ends(loops, s), ends(loops, t), Joint::between(loops, s, t)) {
+            found.push([s, t]);
+        }
+    });
+    found
 }
 
 /// Whether a hole lies outside the outer loop, or inside another hole. As no loops cross or touch, one point of the hole

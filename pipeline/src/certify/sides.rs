@@ -6,7 +6,7 @@ use crate::evaluate::Bvh;
 use crate::vec3::BoundingBox;
 
 /// A side: its loop, and its position there.
-pub(super) type Side = (usize, usize);
+pub(crate) type Side = (usize, usize);
 
 /// The sides of all loops, one after another.
 pub(super) fn sides_of<T>(loops: &[Vec<T>]) -> Vec<Side> {

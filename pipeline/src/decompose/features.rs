@@ -75,6 +75,42 @@ pub(super) fn with_features<'a>(
     Ok((dual, count))
 }
 
+/// The creases of a surface: edges above the lower threshold that continue some above `angle` degrees. Those that part nothing
+/// are among them, and those around small patches: whoever smooths a surface must know of all.
+///
+/// ```
+/// use planish_core::monitor::NoMonitor;
+/// use planish_core::{decompose, repair, shapes};
+///
+/// // A tube of 24 facets is smooth, one of 6 has a crease between each two.
+/// let creases = |around: u32| {
+///     let mesh = repair(&shapes::tube(around, 4, 2.0), &Default::default())?.mesh;
+///     Ok::<_, Box<dyn std::error::Error>>(decompose::creases(&mesh, 40.0, &NoMonitor)?.len())
+/// };
+/// assert_eq!((creases(24)?, creases(6)?), (0, 6 * 4));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`Interrupted`].
+pub fn creases(mesh: &SurfaceMesh, angle: f64, monitor: &dyn Monitor) -> Result<Vec<HalfEdgeId>, Interrupted> {
+    let dual = Dual::new(mesh, monitor);
+    dual.checkpoint()?;
+    let cos = |degrees: f64| degrees.to_radians().cos();
+    let found = bent_edges(&dual, cos(LOWER * angle));
+    let mut chains = UnionFind::new(mesh.points().len());
+    for crease in &found {
+        chains.merge(dual.from(crease.edge), dual.to(crease.edge));
+    }
+    let mut is_sharp = vec![false; mesh.points().len()];
+    for crease in found.iter().filter(|crease| crease.sharpness > 1.0 - cos(angle)) {
+        is_sharp[chains.find(dual.from(crease.edge))] = true;
+    }
+    dual.checkpoint()?;
+    let edges = found.into_iter().map(|crease| crease.edge);
+    Ok(edges.filter(|edge| is_sharp[chains.find(dual.from(*edge))]).collect())
+}
+
 /// An edge that may be a feature.
 struct Crease {
     /// The lesser one of its half-edges.
@@ -87,7 +123,7 @@ struct Crease {
 fn mark_features(dual: &mut Dual, angle: f64) -> Result<usize, Interrupted> {
     let cos = |degrees: f64| degrees.to_radians().cos();
     let (sharp, blunt) = (cos(angle), cos(LOWER * angle));
-    let creases = creases(dual, blunt);
+    let creases = bent_edges(dual, blunt);
     creases.iter().for_each(|crease| dual.set_sharpness(crease.edge, crease.sharpness));
     let is_around_face = around_flat_faces(dual, &creases);
     let (creases, short) = long_enough(dual, creases, &is_around_face, 1.0 - sharp);
@@ -107,7 +143,7 @@ fn mark_features(dual: &mut Dual, angle: f64) -> Result<usize, Interrupted> {
 
 /// The edges whose dihedral angle has a cosine below `blunt`, both between their two triangles and between the mean normals
 /// of those around.
-fn creases(dual: &Dual, blunt: f64) -> Vec<Crease> {
+fn bent_edges(dual: &Dual, blunt: f64) -> Vec<Crease> {
     let normals: Vec<Vec3> = (0..dual.mesh.triangles().len()).map(|f| dual.area_vector(f)).collect();
     let normal = |h: HalfEdgeId| normals[h.face().index()];
     let mut candidates: Vec<[HalfEdgeId; 2]> = Vec::new();

@@ -53,6 +53,7 @@ use crate::topology::{ChartId, FaceId, HalfEdgeId, components};
 pub use assemble::assemble;
 pub(crate) use assemble::with_outer;
 pub use boundary_shape::BoundaryShape;
+pub use features::creases;
 use complex::Complex;
 pub(crate) use contacts::touches_itself;
 use contacts::without_contacts;

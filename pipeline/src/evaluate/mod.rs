@@ -6,16 +6,19 @@
 //! point asked for was from it: on a seam or in a corner the answer is a side or a corner of a triangle there, whichever
 //! way rounding falls.
 //!
-//! Curved triangles are evaluated by their straight parts (see [`mod@crate::subdivide`]).
+//! A [`CurvedMap`] does the latter for curved triangles as they are; meshers get them by their straight parts (see
+//! [`mod@crate::subdivide`]).
 
 mod bvh;
 mod closest;
+mod curved;
 mod plane;
 
 pub(crate) use bvh::larger;
 use bvh::smaller;
 pub use bvh::{Bvh, along_curve};
 pub use closest::{OnSegment, OnTriangle, on_segment, on_triangle};
+pub use curved::{CurvedMap, OnBoundary};
 pub use plane::Plane;
 
 use crate::vec3::{BoundingBox, Vec3};

@@ -207,6 +207,19 @@ pub fn measure(mesh: &SurfaceMesh, group: &[u32], groups: usize) -> Vec<Curvatur
     Faces::new(mesh, &grouped, mesh.edges()).curvatures(groups)
 }
 
+/// The principal curvatures at every vertex of `mesh`, in the inverse unit of the input. Copies of a vertex, in sheets and at
+/// borders of labels, count as one: the first of them has its curvatures, and the others have none.
+pub fn at_vertices(mesh: &SurfaceMesh) -> Vec<Principal> {
+    let count = mesh.points().len();
+    let welded = |v: usize| mesh.welded_vertex(VertexId::at(v)) as usize;
+    let mut first = vec![u32::MAX; (0..count).map(welded).max().map_or(0, |w| w + 1)];
+    for v in (0..count).rev() {
+        first[welded(v)] = v as u32;
+    }
+    let groups: Vec<u32> = (0..count).map(|v| first[welded(v)]).collect();
+    measure(mesh, &groups, count).iter().map(|c| c.principal(mesh.metric().scale)).collect()
+}
+
 /// The largest curvature at each vertex of `mesh`, by magnitude, in the inverse unit of the input, where the surface is smooth:
 /// creases part it, and the sides of one have curvatures of their own, the larger of which counts. Sheets and labels that meet
 /// in two triangles along an edge do not part it. `is_crease` tells creases by their half-edges.

@@ -13,6 +13,7 @@
 //! depends on the field, and not on the triangles of the surface: bisecting those made millions of a fan of needles as
 //! long as the part (generic_twin_7081), each over the same places.
 
+use crate::evaluate::Bvh;
 use crate::vec3::{BoundingBox, Vec3, cross, distance, dot, sub};
 
 /// Fields are told up to so many times the size that is asked for everywhere: a larger one may be given to a mesher later.
@@ -67,6 +68,15 @@ impl SizedCube {
         [0, 1, 2].map(|k| self.low[k] + if number >> k & 1 == 1 { self.side } else { 0.0 })
     }
 
+    /// The size at a point in the cube, linear along each axis.
+    fn interpolated(&self, x: Vec3) -> f64 {
+        let along = [0, 1, 2].map(|k| ((x[k] - self.low[k]) / self.side).clamp(0.0, 1.0));
+        let weight = |corner: usize| -> f64 {
+            (0..3).map(|k| if corner >> k & 1 == 1 { along[k] } else { 1.0 - along[k] }).product()
+        };
+        (0..8).map(|corner| weight(corner) * self.sizes[corner]).sum()
+    }
+
     /// How far a point is from the cube, and from its farthest corner.
     fn distances(&self, x: Vec3) -> (f64, f64) {
         let half = 0.5 * self.side;
@@ -78,6 +88,39 @@ impl SizedCube {
             farthest += (off + half) * (off + half);
         }
         (f64::sqrt(nearest), f64::sqrt(farthest))
+    }
+}
+
+/// A field as cubes tell it.
+#[derive(Clone, Debug)]
+pub struct SizeTable {
+    cubes: Vec<SizedCube>,
+    around: Bvh,
+    elsewhere: f64,
+}
+
+impl SizeTable {
+    /// The sizes in these cubes, and `elsewhere`, which is the largest one everywhere.
+    ///
+    /// ```
+    /// use planish_core::measure::sizes::{SizeTable, SizedCube};
+    ///
+    /// let cube = SizedCube { low: [0.0; 3], side: 2.0, sizes: [1.0, 3.0, 1.0, 3.0, 1.0, 3.0, 1.0, 3.0] };
+    /// let table = SizeTable::new(vec![cube], 2.5);
+    /// assert_eq!((table.at([0.5, 1.0, 1.0]), table.at([1.9, 1.0, 1.0]), table.at([9.0; 3])), (1.5, 2.5, 2.5));
+    /// ```
+    pub fn new(cubes: Vec<SizedCube>, elsewhere: f64) -> Self {
+        let around = Bvh::new(cubes.iter().map(|cube| BoundingBox { min: cube.low, max: cube.corner(7) }));
+        Self { cubes, around, elsewhere }
+    }
+
+    /// The size at a point: interpolated in its cube, the least where cubes meet.
+    pub fn at(&self, x: Vec3) -> f64 {
+        let mut least = self.elsewhere;
+        self.around.overlapping(&BoundingBox { min: x, max: x }, |cube| {
+            least = least.min(self.cubes[cube as usize].interpolated(x));
+        });
+        least
     }
 }
 
@@ -333,17 +376,6 @@ mod tests {
         (0..count).map(place).collect()
     }
 
-    /// The size that trilinear interpolation tells at a point; none outside all cubes.
-    fn told_at(cubes: &[SizedCube], x: Vec3) -> Option<f64> {
-        let is_in = |cube: &&SizedCube| (0..3).all(|k| (0.0..=cube.side).contains(&(x[k] - cube.low[k])));
-        let cube = cubes.iter().find(is_in)?;
-        let along = [0, 1, 2].map(|k| (x[k] - cube.low[k]) / cube.side);
-        let weight = |corner: usize| -> f64 {
-            (0..3).map(|k| if corner >> k & 1 == 1 { along[k] } else { 1.0 - along[k] }).product()
-        };
-        Some((0..8).map(|corner| weight(corner) * cube.sizes[corner]).sum())
-    }
-
     /// Points all over a triangle.
     fn over([a, b, c]: [Vec3; 3], steps: u32) -> Vec<Vec3> {
         let at = |i: u32, j: u32| {
@@ -359,8 +391,9 @@ mod tests {
         for count in [1, 9, 100, 1000] {
             let field = SizeField::new(places(count), 0.3);
             let cubes = field.told(&surface, 30.0, usize::MAX).expect("any number");
+            let table = SizeTable::new(cubes, 30.0);
             for x in over(surface[0], 60) {
-                let (found, told) = (field.at(x).min(30.0), told_at(&cubes, x).unwrap_or(30.0));
+                let (found, told) = (field.at(x).min(30.0), table.at(x));
                 assert!((told - found).abs() <= 0.25 * found, "{told} for {found} at {x:?}, {count} places");
             }
         }
@@ -378,8 +411,9 @@ mod tests {
             let one = field.told(&[facet], 100.0, usize::MAX).expect("any number");
             let fan = field.told(&needles, 100.0, usize::MAX).expect("any number");
             assert!((10..1000).contains(&one.len()) && fan.len() <= one.len(), "{} and {}", one.len(), fan.len());
+            let table = SizeTable::new(one.clone(), 100.0);
             for x in over(facet, 500) {
-                let (found, told) = (field.at(x).min(100.0), told_at(&one, x).unwrap_or(100.0));
+                let (found, told) = (field.at(x).min(100.0), table.at(x));
                 assert!((told - found).abs() <= 0.25 * found, "{told} for {found} at {x:?}");
             }
             let least = one.iter().flat_map(|cube| cube.sizes).fold(f64::INFINITY, f64::min);

@@ -7,6 +7,9 @@
 
 mod references;
 mod sections;
+mod write;
+
+pub use write::{MeditMesh, solution};
 
 use super::finish::{self, BadPoints};
 use super::location::{Location, escape};

@@ -10,6 +10,7 @@
 //! planish's. Deliberately absent: any promise about disks that tell that they have written what they have not.
 
 use crate::output::begun;
+use crate::output::listed::{self, Listed};
 use crate::output::own;
 use crate::output::replace;
 use crate::output::staging::{self, Bury, Desk, GATE, Run, Settled};
@@ -19,8 +20,7 @@ use crate::system::orphans;
 use crate::system::passing;
 use parking_lot::Mutex;
 use rustix::io::Errno;
-use std::collections::BTreeSet;
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsStr;
 use std::io::{self, ErrorKind};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -86,7 +86,7 @@ pub fn write_to(folder: &Path, files: &[Content]) -> Result<(), PublishError> {
     for name in half.list().map_err(at(folder))? {
         disk::remove_all(&half, &name).map_err(at(folder))?;
     }
-    staging::write_all(&half, files).map_err(at(folder))
+    listed::write_all(&half, files).map_err(at(folder))
 }
 
 /// Why nothing could be published.
@@ -240,7 +240,7 @@ impl<D: Disk> Publisher<D> {
         self.admits(name)?;
         let staged = self.room()?;
         let half = staged.desk.half().map_err(at(&staged.run.path))?;
-        staging::write_all(&half, files).map_err(at(&self.target(name)))?;
+        listed::write_all(&half, files).map_err(at(&self.target(name)))?;
         self.put(name, &staged, wanted)
     }
 
@@ -314,7 +314,7 @@ impl<D: Disk> Publisher<D> {
     ///
     /// # Errors
     /// [`PublishError`]: what stands there.
-    pub fn admits(&self, name: &Path) -> Result<BTreeSet<OsString>, PublishError> {
+    pub fn admits(&self, name: &Path) -> Result<Listed, PublishError> {
         let target = self.target(name);
         if !is_plain(name) {
             return Err(PublishError::Foreign(target));
@@ -323,7 +323,7 @@ impl<D: Disk> Publisher<D> {
         for part in folders_above(name) {
             let path = self.out.join(part);
             folder = match self.disk.open(&path) {
-                Err(error) if error.kind() == ErrorKind::NotFound => return Ok(BTreeSet::new()),
+                Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Listed::default()),
                 Err(error) if disk::is_no_folder(&error) => return Err(PublishError::Foreign(path)),
                 opened => opened.map_err(at(&path))?,
             };
@@ -374,9 +374,9 @@ fn folders_above(name: &Path) -> Vec<&Path> {
 
 /// The names of what planish has written there: none of them where nothing is there, or an empty folder. None where it is
 /// neither that nor an older result (a folder with a report of planish).
-fn replaceable<F: Folder>(folder: &F, name: &OsStr) -> io::Result<Option<BTreeSet<OsString>>> {
+fn replaceable<F: Folder>(folder: &F, name: &OsStr) -> io::Result<Option<Listed>> {
     let found = match folder.stat_of(name) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Some(BTreeSet::new())),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Some(Listed::default())),
         found => found?,
     };
     if !found.is_folder() {
@@ -386,7 +386,7 @@ fn replaceable<F: Folder>(folder: &F, name: &OsStr) -> io::Result<Option<BTreeSe
     if let Some(own) = replace::own_files(&result)? {
         return Ok(Some(own));
     }
-    Ok(result.list()?.is_empty().then(BTreeSet::new))
+    Ok(result.list()?.is_empty().then(Listed::default))
 }
 
 /// Why a result was not put in place.

@@ -280,6 +280,11 @@ fn remove_folder<F: Folder>(folder: &F, name: &OsStr) -> io::Result<()> {
     folder.remove_folder(name)
 }
 
+/// Whether a folder was not removed as there is something in it.
+pub fn is_full(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::DirectoryNotEmpty | io::ErrorKind::AlreadyExists)
+}
+
 /// Whether a file system tells that it cannot do this at all.
 pub fn is_unsupported(error: &io::Error) -> bool {
     matches!(Errno::from_io_error(error), Some(Errno::INVAL | Errno::NOSYS | Errno::OPNOTSUPP))
