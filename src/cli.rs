@@ -1,7 +1,8 @@
 //! The command line.
 
 use crate::settings::{
-    AlsoFiles, Boundary, ExportTargets, FeatureAngle, Inputs, Log, RawSettings, Refine, Refused, Settings, SettingsError,
+    AlsoFiles, Boundary, ExportTargets, FeatureAngle, Inputs, Log, RawSettings, Refine, Refused, Settings,
+    SettingsError,
 };
 use bytesize::ByteSize;
 use clap::{ArgAction, Args, Parser, Subcommand};
@@ -30,6 +31,8 @@ pub enum Verb {
     Check(Check),
     /// Tell what a surface is: topology, defects
     Info(Info),
+    /// Carry meshes made in the planes of charts, or a table of points there, onto the surface
+    Lift(Lift),
     /// Tell what a running daemon does: queue, stages and progress, done, refused
     Status(Status),
     /// Have inputs done again whose result is not certified
@@ -261,6 +264,10 @@ pub struct Check {
     /// The edge length that the mesher was asked for, in the unit of the input [default: that of remesh.geo]
     #[arg(long, value_name = "H", requires = "mesh")]
     pub size: Option<f64>,
+    /// How far nodes may be off the surface, relative to the diagonal of its bounding box: more than rounding for meshes of
+    /// programs that do not know the surface, as mmgs
+    #[arg(long, value_name = "REL", requires = "mesh", default_value_t = 1e-6)]
+    pub off: f64,
     /// The least gamma of a fine element
     #[arg(long, value_name = "G", requires = "mesh", default_value_t = 0.1)]
     pub min_gamma: f64,
@@ -275,6 +282,30 @@ pub struct Check {
     /// Print what is found of the mesh as JSON
     #[arg(long, requires = "mesh")]
     pub json: bool,
+    /// Shared options
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// `planish lift`
+#[derive(Debug, Args)]
+pub struct Lift {
+    /// Meshes of the planes of charts, which tell their charts: by references (.mesh) or surfaces (.msh) that count from 1, by an
+    /// array `chart` (.vtk, .vtu), or by a name like chart-012.stl. Or a table with the columns chart, u and v (.csv)
+    #[arg(required = true, value_name = "MESH")]
+    pub meshes: Vec<PathBuf>,
+    /// The result whose charts these are: its folder, or its report.json
+    #[arg(long, value_name = "DIR")]
+    pub atlas: PathBuf,
+    /// The mesh on the surface (.msh .vtu .stl .mesh .obj), or the table of points in space (.csv)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Order of the elements: 2 gives them nodes in the middle of sides, which lie on the surface (.msh and .vtu) [default: 1]
+    #[arg(long, value_name = "1|2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    pub mesh_order: Option<u8>,
+    /// The mesh is one in space: bring its nodes to the nearest places of the surface
+    #[arg(long)]
+    pub project: bool,
     /// Shared options
     #[command(flatten)]
     pub common: Common,
@@ -354,6 +385,7 @@ impl Verb {
             Self::Watch(watch) => (&watch.common, watch.said()),
             Self::Check(check) => (&check.common, RawSettings::default()),
             Self::Info(info) => (&info.common, info.reading.said()),
+            Self::Lift(lift) => (&lift.common, RawSettings::default()),
             Self::Apart(apart) => (&apart.common, RawSettings { log: Some(Log::Json), ..RawSettings::default() }),
             Self::Retry(retry) => (&retry.common, RawSettings { out: retry.out.clone(), ..RawSettings::default() }),
             Self::Status(status) => (&status.common, RawSettings { out: status.out.clone(), ..RawSettings::default() }),

@@ -30,6 +30,7 @@ fn dispatch(verb: &Verb, settings: &Settings) -> Result<Exit, Box<dyn std::error
             None => Ok(verbs::check::check(&check.results, settings.quiet)),
         },
         Verb::Info(info) => verbs::info::info(&info.inputs, info.json, settings),
+        Verb::Lift(lift) => verbs::lift::lift(lift, settings),
         Verb::Apart(apart) => verbs::job::job(apart, settings),
         Verb::Status(status) => verbs::status::status(status, settings),
         Verb::Retry(retry) => verbs::retry::retry(&retry.names, settings),

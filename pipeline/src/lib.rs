@@ -34,7 +34,7 @@
 //!    be, and proves the result one-to-one ([`certify`]): a [`CertifiedChart`].
 //! 5. [`CertifiedAtlas::gather`] puts the charts together, and finds the [curves](seams) between them.
 //! 6. [`mod@subdivide`] makes linear triangulations of an atlas, for meshers that know of charts, [`planar`] meshes of their planes
-//!    for those that do not; [`evaluate`] goes from space to the plane and back;
+//!    for those that do not, whose work is [lifted](mod@lift) back; [`evaluate`] goes from space to the plane and back;
 //!    [`soundness`] tells whether a mesh that was made through them is any good.
 //!
 //! # What is promised
@@ -67,6 +67,7 @@ pub mod decompose;
 pub mod evaluate;
 pub mod fem;
 pub mod grid;
+pub mod lift;
 pub mod map;
 pub mod measure;
 pub mod mesh;

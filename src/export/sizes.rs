@@ -62,12 +62,7 @@ pub(super) enum Seams<'a> {
 }
 
 /// The sizes of a mesh that is wanted. `curvatures` are those of the vertices of the surface; more may follow.
-pub(super) fn varying(
-    atlas: &CertifiedAtlas,
-    curvatures: &[Principal],
-    seams: Seams,
-    wanted: &Wanted,
-) -> Varying {
+pub(super) fn varying(atlas: &CertifiedAtlas, curvatures: &[Principal], seams: Seams, wanted: &Wanted) -> Varying {
     let (mesh, charts, sizes) = (atlas.mesh(), atlas.charts(), &wanted.sizes);
     let Places { sized, curves, gaps } = match seams {
         Seams::Kept { adapted } => narrow::places(mesh, charts, atlas.seams(), adapted, sizes.size),

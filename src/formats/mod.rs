@@ -8,6 +8,7 @@ mod joined;
 mod labels;
 pub mod layout;
 mod location;
+pub mod made;
 pub mod medit;
 mod msh;
 #[cfg(test)]
@@ -34,6 +35,7 @@ pub use content::{Content, NoSiblings, Notes, SiblingFiles, Source, TooMany};
 pub use gltf::glb;
 pub use joined::JoinedVertices;
 pub use labels::{Label, LabelError, label_index};
+pub use made::{MadeFormat, MadeMesh};
 use location::Location;
 pub use obj::surface as surface_obj;
 pub use patches::Patches;
@@ -394,6 +396,17 @@ pub fn read_patches(format: Format, source: &Source) -> Result<Patches, ReadErro
     let soup = read(format, source)?.soup;
     let triangles = soup.triangles().len();
     Ok(Patches::new(&soup, vec![None; triangles], None))
+}
+
+/// The bytes of a mesh that planish has made.
+pub fn encode_made(format: MadeFormat, mesh: &MadeMesh) -> Vec<u8> {
+    match format {
+        MadeFormat::Msh => gmsh::made(mesh),
+        MadeFormat::Vtu => vtk::made(mesh),
+        MadeFormat::Stl => stl::made(mesh),
+        MadeFormat::Medit => medit::made(mesh),
+        MadeFormat::Obj => obj::made(mesh),
+    }
 }
 
 /// As [`read`], with the usual limits and nothing beside the file.

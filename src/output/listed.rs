@@ -180,11 +180,15 @@ mod tests {
         write_all(&folder, &[content("a.vtu"), content("mmg/b.mesh"), content("mmg/c.sol")]).expect("written");
         assert!(open_file(&folder, "mmg/c.sol").is_ok() && open_file(&folder, "mmg/../a.vtu").is_err());
         let own = listed(&["a.vtu", "mmg/b.mesh", "mmg/c.sol"]);
-        assert!(own.is_all_of(&folder).expect("read") && !listed(&["a.vtu", "mmg/b.mesh"]).is_all_of(&folder).expect("read"));
+        assert!(
+            own.is_all_of(&folder).expect("read")
+                && !listed(&["a.vtu", "mmg/b.mesh"]).is_all_of(&folder).expect("read")
+        );
         fs::write(place.path().join("mmg/mine.mesh"), "mine").expect("written");
         assert!(!own.is_all_of(&folder).expect("read"));
         own.remove(&folder, "report.json").expect("removed");
-        let left: Vec<_> = fs::read_dir(place.path().join("mmg")).expect("stays").flatten().map(|e| e.file_name()).collect();
+        let left: Vec<_> =
+            fs::read_dir(place.path().join("mmg")).expect("stays").flatten().map(|e| e.file_name()).collect();
         assert_eq!((left, place.path().join("a.vtu").exists()), (vec![OsString::from("mine.mesh")], false));
         assert!(write_all(&folder, &[content("../out")]).is_err());
     }

@@ -455,13 +455,7 @@ impl<F: Folder> Desk<F> {
     }
 
     /// What was put into the older result since its foreign files were kept goes to the newer one, too.
-    fn keep_late(
-        &self,
-        aside: &str,
-        folder: &F,
-        target: &Path,
-        own: Option<&Listed>,
-    ) -> Result<(), PublishError> {
+    fn keep_late(&self, aside: &str, folder: &F, target: &Path, own: Option<&Listed>) -> Result<(), PublishError> {
         let foreign = || PublishError::Foreign(target.to_owned());
         let name = target.file_name().unwrap_or_default();
         let open = |folder: &F, name: &OsStr| match folder.open_folder(name) {

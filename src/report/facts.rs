@@ -2,8 +2,8 @@
 //! the end. So a report never holds what a stage that broke down has left behind.
 
 use super::{
-    ChartReport, Decomposition, ExportReport, Input, LabelReport, MmgReport, Output, Refinement, RefusedComponent, Repairs,
-    Report, Seams, Surface, Warning,
+    ChartReport, Decomposition, ExportReport, Input, LabelReport, MmgReport, Output, Refinement, RefusedComponent,
+    Repairs, Report, Seams, Surface, Warning,
 };
 use crate::formats::Notes;
 use crate::outcome::{Reason, Status};

@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 pub use template::{Part, Placeholder, Template, TemplateError};
 pub use values::{
-    Also, AlsoFiles, Boundary, ExportTarget, ExportTargets, FeatureAngle, Inputs, LabelSource, Log, Off, RawCommand, RawLimits,
-    Refine, Refused,
+    Also, AlsoFiles, Boundary, ExportTarget, ExportTargets, FeatureAngle, Inputs, LabelSource, Log, Off, RawCommand,
+    RawLimits, Refine, Refused,
 };
 
 /// What was said, on the command line or in planish.toml; the same names in both, except that commands are said in

@@ -29,6 +29,8 @@ pub struct Question {
     pub mesh: PathBuf,
     /// The edge length that was asked for; that of the hand-off where none is given.
     pub size: Option<f64>,
+    /// How far nodes may be off the surface, relative to its diagonal: single precision rounds by a tenth of 1e-6.
+    pub off_surface: f64,
     /// The least gamma of a fine element.
     pub min_gamma: f64,
     /// How far mesh and surface may be from each other, where that is asked.
@@ -42,13 +44,10 @@ pub struct Question {
 impl Question {
     /// What is asked of a mesh, if one is given.
     pub fn of(asked: &cli::Check) -> Option<Self> {
-        let cli::Check { size, min_gamma, deviation, finer, json, .. } = *asked;
-        Some(Self { mesh: asked.mesh.clone()?, size, min_gamma, deviation, finer, json })
+        let cli::Check { size, off, min_gamma, deviation, finer, json, .. } = *asked;
+        Some(Self { mesh: asked.mesh.clone()?, size, off_surface: off, min_gamma, deviation, finer, json })
     }
 }
-
-/// How far nodes may be off the surface, relative to its diagonal: single precision rounds by a tenth of that.
-const OFF_SURFACE: f64 = 1e-6;
 
 /// Why a mesh cannot be judged.
 #[derive(Debug, thiserror::Error)]
@@ -75,6 +74,9 @@ pub fn check_mesh(
     };
     if question.size.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
         return Err("--size must be a positive number: the edge length that the mesher was asked for".into());
+    }
+    if !(question.off_surface.is_finite() && question.off_surface >= 0.0) {
+        return Err("--off must be a number from 0 on: a share of the diagonal of the surface".into());
     }
     if !(0.0..=1.0).contains(&question.min_gamma) {
         return Err("--min-gamma must lie between 0 and 1".into());
@@ -132,8 +134,8 @@ fn judge(folder: &Path, question: &Question, settings: &Settings) -> Result<Mesh
     let mesh_file = Output::of(&name, &bytes);
     let atlas = if patches.surfaces().is_some() { atlas(folder, &report, &mut bytes)? } else { None };
     drop(bytes);
-    let (min_gamma, deviation) = (question.min_gamma, question.deviation);
-    let asked = soundness::Settings { size, min_gamma, off_surface: OFF_SURFACE, deviation };
+    let &Question { off_surface, min_gamma, deviation, .. } = question;
+    let asked = soundness::Settings { size, min_gamma, off_surface, deviation };
     let found = soundness::examine(&mesh(&patches), &surface, &charts, atlas.as_ref(), &asked);
     let mut judged = MeshReport::new(mesh_file, surface_file, size, min_gamma, &found);
     if let (true, Some(deviation), Some(told)) = (question.finer, &found.deviation, &mut judged.deviation) {

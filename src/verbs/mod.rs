@@ -1,11 +1,14 @@
 //! The verbs of the command line.
 
+mod atlas;
 pub mod check;
 pub mod check_config;
 pub mod check_mesh;
 mod finer;
 pub mod info;
 pub mod job;
+pub mod lift;
+mod planar_input;
 pub mod retry;
 pub mod run;
 pub mod status;

@@ -82,6 +82,11 @@ impl CurvedMap {
         &self.cells
     }
 
+    /// Where a corner lies in space.
+    pub fn point(&self, node: u32) -> Vec3 {
+        self.points[node as usize]
+    }
+
     /// The sides that one triangle has: it, and the corner at which the side begins.
     pub fn boundary(&self) -> &[(u32, u8)] {
         &self.sides
@@ -231,9 +236,8 @@ impl Quadratic {
     #[inline]
     fn at(&self, [xi, eta]: [f64; 2]) -> [f64; 2] {
         let c = &self.0;
-        let along = |k: usize| {
-            c[0][k] + xi * (c[1][k] + xi * c[3][k] + eta * c[4][k]) + eta * (c[2][k] + eta * c[5][k])
-        };
+        let along =
+            |k: usize| c[0][k] + xi * (c[1][k] + xi * c[3][k] + eta * c[4][k]) + eta * (c[2][k] + eta * c[5][k]);
         [along(0), along(1)]
     }
 
@@ -330,11 +334,7 @@ impl QuadraticArc {
     /// By its nodes, that in the middle second.
     fn of([a, m, b]: [[f64; 2]; 3]) -> Self {
         let each = |formula: &dyn Fn(usize) -> f64| [formula(0), formula(1)];
-        Self([
-            a,
-            each(&|k| 4.0 * (m[k] - a[k]) - (b[k] - a[k])),
-            each(&|k| 2.0 * ((b[k] - m[k]) - (m[k] - a[k]))),
-        ])
+        Self([a, each(&|k| 4.0 * (m[k] - a[k]) - (b[k] - a[k])), each(&|k| 2.0 * ((b[k] - m[k]) - (m[k] - a[k])))])
     }
 
     fn at(&self, t: f64) -> [f64; 2] {

@@ -143,7 +143,8 @@ impl<'a> Field<'a> {
         let chart = self.certified.chart();
         let sides = chart.edges().sides(edge);
         let begin = chart.from(sides[0]);
-        let at = |h: &HalfEdgeId| self.inside(h.face().0, on_side(*h, if chart.from(*h) == begin { t } else { 1.0 - t }));
+        let at =
+            |h: &HalfEdgeId| self.inside(h.face().0, on_side(*h, if chart.from(*h) == begin { t } else { 1.0 - t }));
         Metric::mean(&sides.iter().map(at).collect::<Vec<_>>())
     }
 
@@ -181,7 +182,9 @@ mod tests {
 
     #[test]
     fn what_is_singular_is_held() {
-        for derivative in [[[0.0; 3]; 2], [[1.0, 0.0, 0.0]; 2], [[f64::NAN; 3]; 2], [[1e-300, 0.0, 0.0], [0.0, 1e300, 0.0]]] {
+        for derivative in
+            [[[0.0; 3]; 2], [[1.0, 0.0, 0.0]; 2], [[f64::NAN; 3]; 2], [[1e-300, 0.0, 0.0], [0.0, 1e300, 0.0]]]
+        {
             let m = Metric::pulled_back(derivative, 0.1);
             assert!(m.uu > 0.0 && m.vv > 0.0 && m.uu.is_finite() && m.vv.is_finite() && m.uv.is_finite(), "{m:?}");
         }

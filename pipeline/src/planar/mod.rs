@@ -68,7 +68,9 @@ pub struct PolygonSide {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// Chords cross, however short.
-    #[error("the boundary of chart {chart} in the plane comes closer to itself along curve {curve} than chords can follow")]
+    #[error(
+        "the boundary of chart {chart} in the plane comes closer to itself along curve {curve} than chords can follow"
+    )]
     Close {
         /// The chart.
         chart: ChartId,

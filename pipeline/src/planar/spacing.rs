@@ -154,7 +154,8 @@ impl Chains {
 /// The nodes of a cell at a half-edge of its chart.
 fn cell_of(chart: &crate::atlas::Chart, h: HalfEdgeId) -> [u32; 6] {
     let corners = chart.triangles()[h.face().index()];
-    let middle = |side| (chart.vertices().len() + chart.edges().edge(HalfEdgeId::side_of(h.face(), side)).index()) as u32;
+    let middle =
+        |side| (chart.vertices().len() + chart.edges().edge(HalfEdgeId::side_of(h.face(), side)).index()) as u32;
     [corners[0].0, corners[1].0, corners[2].0, middle(0), middle(1), middle(2)]
 }
 

@@ -108,7 +108,8 @@ fn triangles(nodes: &[Node], sides: &[PolygonSide]) -> Option<Vec<[u32; 3]>> {
     let vertices: Vec<Numbered> = nodes.iter().zip(0..).map(numbered).collect();
     let constraints = sides.iter().map(|side| side.ends.map(|n| n as usize)).collect();
     let mut conflicts = 0;
-    let all = ConstrainedDelaunayTriangulation::<Numbered>::try_bulk_load_cdt(vertices, constraints, |_| conflicts += 1);
+    let all =
+        ConstrainedDelaunayTriangulation::<Numbered>::try_bulk_load_cdt(vertices, constraints, |_| conflicts += 1);
     let all = all.ok().filter(|all| conflicts == 0 && all.num_vertices() == nodes.len())?;
     let is_inside = inside(&all);
     let mut triangles = Vec::new();

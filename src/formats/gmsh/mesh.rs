@@ -145,7 +145,7 @@ fn corners(kind: i32) -> usize {
 }
 
 /// Number of blocks and of entries, least and largest tag.
-fn header(out: &mut Binary, blocks: usize, total: usize) {
+pub(super) fn header(out: &mut Binary, blocks: usize, total: usize) {
     for number in [blocks, total, 1, total] {
         out.size(number);
     }

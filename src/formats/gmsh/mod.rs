@@ -5,12 +5,14 @@
 mod binary;
 mod geo;
 mod groups;
+mod made;
 mod mesh;
 mod pos;
 mod read;
 
 pub use geo::{Algorithms, Script, remesh};
 pub use groups::Group;
+pub use made::made;
 pub use pos::{SizedTriangle, on_cubes, on_triangles};
 pub use read::{AtlasError, read as read_atlas};
 

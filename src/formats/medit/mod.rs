@@ -5,10 +5,12 @@
 //! second order are taken by their corners, and their references are labels. Edges and elements of volumes are counted,
 //! all other sections are passed over, whatever they hold. In two dimensions z is 0. `#` begins a comment.
 
+mod made;
 mod references;
 mod sections;
 mod write;
 
+pub use made::made;
 pub use write::{MeditMesh, solution};
 
 use super::finish::{self, BadPoints};

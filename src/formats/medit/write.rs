@@ -68,7 +68,8 @@ impl<const N: usize> MeditMesh<N> {
 /// ```
 pub fn solution<const M: usize>(dimension: usize, values: &[[f64; M]]) -> Vec<u8> {
     let kind = if M == 1 { 1 } else { 3 };
-    let mut out = format!("MeshVersionFormatted 2\n\nDimension {dimension}\n\nSolAtVertices\n{}\n1 {kind}\n", values.len());
+    let mut out =
+        format!("MeshVersionFormatted 2\n\nDimension {dimension}\n\nSolAtVertices\n{}\n1 {kind}\n", values.len());
     for value in values {
         numbers(&mut out, value);
         out.push('\n');

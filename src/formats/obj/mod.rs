@@ -6,9 +6,12 @@
 //! and texture coordinates that nobody needs.) Polygons are cut into triangles; vertices keep the numbers they have in
 //! the file.
 
+mod made;
 mod parts;
 mod statements;
 pub mod surface;
+
+pub use made::made;
 
 use super::finish::{self, BadPoints};
 use super::location::{Location, escape};

@@ -7,6 +7,10 @@
 //! with something appended, which is told and not read. Text that ends after a facet, without `endsolid`, is read, and that
 //! is told; text that ends in a facet is refused.
 
+mod write;
+
+pub use write::made;
+
 use super::finish::{self, BadPoints};
 use super::labels::{self, Labels};
 use super::location::{Location, escape};

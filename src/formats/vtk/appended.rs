@@ -76,14 +76,16 @@ impl Array {
     }
 }
 
-/// Triangles of six nodes, with what is known of nodes and cells.
+/// Triangles of three or six nodes, with what is known of nodes and cells.
 pub(super) struct Grid {
     /// How many nodes there are.
     pub count: usize,
     /// Their positions.
     pub points: Array,
-    /// The six nodes of one cell after the other.
+    /// The nodes of one cell after the other.
     pub cells: Vec<u32>,
+    /// Three or six.
+    pub nodes_per_cell: usize,
     pub of_points: Vec<Array>,
     pub of_cells: Vec<Array>,
     /// The element `FieldData`, if there is any.
@@ -93,12 +95,14 @@ pub(super) struct Grid {
 impl Grid {
     /// The bytes of a file.
     pub fn into_bytes(self) -> Vec<u8> {
-        let cells = self.cells.len() / 6;
+        let per_cell = self.nodes_per_cell;
+        let cells = self.cells.len() / per_cell;
+        let kind = if per_cell == 3 { super::cell::TRIANGLE } else { super::cell::QUADRATIC_TRIANGLE };
         let nodes = self.cells.iter().map(|n| u64::from(*n));
         let topology = [
             Array::ids("connectivity", self.count as u64, nodes),
-            Array::ids("offsets", self.cells.len() as u64, (1..=cells as u64).map(|i| 6 * i)),
-            Array::bytes("types", &vec![super::cell::QUADRATIC_TRIANGLE; cells]),
+            Array::ids("offsets", self.cells.len() as u64, (1..=cells as u64).map(|i| per_cell as u64 * i)),
+            Array::bytes("types", &vec![kind; cells]),
         ];
         drop(self.cells);
         let sections: [(&str, Vec<Array>); 4] = [

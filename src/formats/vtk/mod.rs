@@ -14,6 +14,7 @@ mod error;
 mod legacy;
 mod legacy_arrays;
 mod legacy_sizes;
+mod made;
 mod packed;
 mod read_back;
 mod scalar;
@@ -34,6 +35,7 @@ mod xml_tests;
 use super::{Content, ReadError, Source};
 use error::Location;
 pub use error::VtkError;
+pub use made::made;
 
 /// Reads a file of VTK.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {

@@ -34,6 +34,9 @@ const INDICES: [Scalar; 3] = [Scalar::I32, Scalar::I64, Scalar::U64];
 /// The field that tells the charts of a surface.
 const CHART: [Field; 1] = [Field::OfCells("chart")];
 
+/// The field that tells labels.
+const LABEL: [Field; 1] = [Field::OfCells("label")];
+
 /// Reads a file that planish wrote.
 ///
 /// # Errors
@@ -48,6 +51,14 @@ pub fn read(bytes: &[u8]) -> Result<Grid, VtuError> {
 /// As [`read`].
 pub fn read_shape(bytes: &[u8]) -> Result<Shape, VtuError> {
     columns(bytes, &CHART, |columns| columns.shape())
+}
+
+/// The tag of the label of each cell of a file that planish wrote; none where the surface has no labels.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_labels(bytes: &[u8]) -> Result<Option<Vec<i32>>, VtuError> {
+    columns(bytes, &LABEL, |columns| columns.labels())
 }
 
 fn columns<T>(
@@ -75,6 +86,14 @@ struct Columns<'a, 'p> {
 }
 
 impl Columns<'_, '_> {
+    fn labels(&mut self) -> Result<Option<Vec<i32>>, VtuError> {
+        let field = LABEL[0];
+        if self.piece.array(Role::Field(field)).is_none() {
+            return Ok(None);
+        }
+        self.integers(field, "label", self.piece.cells[0]).map(Some)
+    }
+
     fn grid(&mut self) -> Result<Grid, VtuError> {
         let (n, m) = (self.piece.points, self.piece.cells[0]);
         let Shape { points, cells, chart } = self.shape()?;

@@ -2,7 +2,7 @@
 
 use super::appended::{self, Array};
 use super::error::VtkError;
-pub use super::read_back::{read, read_shape};
+pub use super::read_back::{read, read_labels, read_shape};
 use super::vtm::escape;
 use crate::formats::layout::layout;
 use crate::formats::{Label, label_index};
@@ -112,6 +112,7 @@ fn encode(
         count,
         points: Array::doubles("Points", 3, places),
         cells,
+        nodes_per_cell: 6,
         of_points: point_fields(charts),
         of_cells: cell_fields(atlas, charts, labels),
         field_data: names_of_labels(labels),

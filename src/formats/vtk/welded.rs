@@ -30,6 +30,7 @@ pub fn surface(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<u8> {
         count: nodes.points.len(),
         points: Array::doubles("Points", 3, nodes.points.iter().flatten().copied()),
         cells: cells.into_flattened(),
+        nodes_per_cell: 6,
         of_points: vec![Array::integers("vertex", nodes.input.iter().copied())],
         of_cells: cell_fields(atlas, labels),
         field_data: names_of_labels(labels),
