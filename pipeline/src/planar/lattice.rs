@@ -6,8 +6,8 @@ use crate::topology::{EdgeId, HalfEdgeId, VertexId};
 /// A triangle is halved for every change of the metric by this, in the norm of logarithms: of sizes by a tenth.
 const CHANGE: f64 = 0.2;
 
-/// And no more often than so many times: the lattice of a triangle has eight steps.
-const FINEST: u32 = 3;
+/// And no more often than so many times: the lattice of a triangle has sixteen steps.
+const FINEST: u32 = 4;
 
 /// A node inside a chart.
 #[derive(Clone, Copy, Debug)]
@@ -42,8 +42,15 @@ pub(super) fn nodes(field: &Field) -> Vec<Node> {
 /// In how many steps the lattice of a triangle goes along its sides: a power of two.
 fn steps(field: &Field, face: u32) -> u32 {
     let corners = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|l| field.inside(face, l));
-    let change = (0..3).map(|k| corners[k].apart(&corners[(k + 1) % 3])).fold(0.0, f64::max);
-    let halvings = (change / CHANGE).max(1.0).log2().ceil().min(f64::from(FINEST));
+    let middles = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]].map(|l| field.inside(face, l));
+    let mut change = 0.0_f64;
+    for k in 0..3 {
+        let next = (k + 1) % 3;
+        let around = [middles[k].apart(&corners[k]), middles[k].apart(&corners[next]), middles[k].apart(&middles[next])];
+        change = around.into_iter().fold(change, f64::max);
+    }
+    // Over half of a side.
+    let halvings = (2.0 * change / CHANGE).max(1.0).log2().ceil().min(f64::from(FINEST));
     1 << halvings as u32
 }
 
