@@ -75,40 +75,29 @@ pub(super) fn with_features<'a>(
     Ok((dual, count))
 }
 
-/// The creases of a surface: edges above the lower threshold that continue some above `angle` degrees. Those that part nothing
-/// are among them, and those around small patches: whoever smooths a surface must know of all.
+/// The feature edges of a surface, with a dihedral angle above `angle` degrees or continuing such: those along which charts
+/// end where they can. Each by the lesser of its half-edges.
 ///
 /// ```
 /// use planish_core::monitor::NoMonitor;
 /// use planish_core::{decompose, repair, shapes};
 ///
 /// // A tube of 24 facets is smooth, one of 6 has a crease between each two.
-/// let creases = |around: u32| {
+/// let features = |around: u32| {
 ///     let mesh = repair(&shapes::tube(around, 4, 2.0), &Default::default())?.mesh;
-///     Ok::<_, Box<dyn std::error::Error>>(decompose::creases(&mesh, 40.0, &NoMonitor)?.len())
+///     Ok::<_, Box<dyn std::error::Error>>(decompose::features(&mesh, 40.0, &NoMonitor)?.len())
 /// };
-/// assert_eq!((creases(24)?, creases(6)?), (0, 6 * 4));
+/// assert_eq!((features(24)?, features(6)?), (0, 6 * 4));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
 /// [`Interrupted`].
-pub fn creases(mesh: &SurfaceMesh, angle: f64, monitor: &dyn Monitor) -> Result<Vec<HalfEdgeId>, Interrupted> {
-    let dual = Dual::new(mesh, monitor);
-    dual.checkpoint()?;
-    let cos = |degrees: f64| degrees.to_radians().cos();
-    let found = bent_edges(&dual, cos(LOWER * angle));
-    let mut chains = UnionFind::new(mesh.points().len());
-    for crease in &found {
-        chains.merge(dual.from(crease.edge), dual.to(crease.edge));
-    }
-    let mut is_sharp = vec![false; mesh.points().len()];
-    for crease in found.iter().filter(|crease| crease.sharpness > 1.0 - cos(angle)) {
-        is_sharp[chains.find(dual.from(crease.edge))] = true;
-    }
-    dual.checkpoint()?;
-    let edges = found.into_iter().map(|crease| crease.edge);
-    Ok(edges.filter(|edge| is_sharp[chains.find(dual.from(*edge))]).collect())
+pub fn features(mesh: &SurfaceMesh, angle: f64, monitor: &dyn Monitor) -> Result<Vec<HalfEdgeId>, Interrupted> {
+    let mut dual = Dual::new(mesh, monitor);
+    mark_features(&mut dual, angle)?;
+    let is_lesser = |h: &HalfEdgeId| dual.twin(*h).is_some_and(|twin| *h < twin);
+    Ok(dual.half_edges().filter(|h| is_lesser(h) && dual.is_feature(*h)).collect())
 }
 
 /// An edge that may be a feature.
