@@ -55,7 +55,7 @@ fn integers<'f>(fields: &'f [Field], name: &str) -> &'f [i64] {
 }
 
 /// What a file of the result holds, as a reader that knows nothing of planish finds it. (Names of planish's own arrays get a prefix
-/// when they are read, and those that have it, another.)
+/// when they are read, and those that have it keep them.)
 fn read(out: &Out, file: &str) -> Content {
     read_alone(Format::Vtu, &out.read("square.vtk", file)).expect("a surface")
 }
@@ -64,9 +64,9 @@ fn assert_carried(Content { soup, fields: Fields { points, cells, .. }, .. }: &C
     for (point, value) in soup.points().iter().zip(floats(points, "linear")) {
         assert!((value - point[0] - 2.0 * point[1]).abs() <= 4e-11, "{value} at {point:?}");
     }
-    assert_eq!(field(points, "input_input_uv").components, 3);
+    assert_eq!(field(points, "input_uv").components, 3);
     // Both triangles of a quadrilateral, and all of their parts.
-    let numbers = integers(cells, "input_cell").iter().zip(floats(cells, "input_input_chart"));
+    let numbers = integers(cells, "input_cell").iter().zip(floats(cells, "input_chart"));
     assert!(numbers.clone().count() >= 20 && numbers.clone().all(|(cell, value)| *cell as f64 + 0.5 == *value));
     let halves = integers(cells, "input_triangle").iter().zip(integers(cells, "input_cell"));
     assert!(halves.clone().all(|(triangle, cell)| triangle / 2 == *cell));
