@@ -1,6 +1,6 @@
 //! Fields: the arrays of numbers that a file has at its points and cells, which go with the surface into surface.vtu.
 //!
-//! Readers find them ([`Keeping`]), and whoever writes a surface carries them to its nodes. Whole numbers are names more often
+//! Readers find them (`Keeping`), and whoever writes a surface carries them to its nodes. Whole numbers are names more often
 //! than quantities (parts, flags, colours): they stay whole, and no number is made that the file does not have.
 
 use super::location::escape;
@@ -218,7 +218,8 @@ impl<'n> Keeping<'n> {
             self.leave_out(on, name, "another one before it has the same name");
             return Ok(false);
         }
-        let values = components.saturating_mul(entries);
+        // One entry is in memory at least while it is read.
+        let values = components.saturating_mul(entries.max(1));
         self.values = self.values.saturating_add(values);
         TooMany::check("values of arrays", self.values, self.limits.elements)?;
         let Some(room) = self.room.checked_sub(values.saturating_mul(8)) else {

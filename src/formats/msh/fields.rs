@@ -10,11 +10,15 @@ use super::surface::Elements;
 use super::values::{SectionError, Values};
 use super::views::{Head, head, place};
 use crate::formats::fields::{Fields, Keeping, On, Values as FieldValues};
+use crate::formats::location::escape;
 use crate::formats::{Notes, Source};
 use std::collections::HashMap;
 
 /// The name of the section of values at elements.
 pub const OF_ELEMENTS: &str = "ElementData";
+
+/// The step of what has no values yet.
+const NEVER: u32 = u32::MAX;
 
 /// The views of a file that are kept.
 pub struct Kept<'n> {
@@ -71,7 +75,8 @@ impl<'n> Kept<'n> {
     pub fn elements<'a, V: Values<'a>>(&mut self, values: V, elements: Option<&Elements>) -> Result<(), MshError> {
         let count = elements.map(Elements::triangles);
         self.section(On::Cells, values, count, |tag, each| {
-            elements.into_iter().flat_map(|elements| elements.of_tag(tag)).for_each(each);
+            // Tags may be the same for very many: where the first has its values, all have.
+            elements.into_iter().flat_map(|elements| elements.of_tag(tag)).all(each);
             Ok(())
         })
     }
@@ -81,13 +86,14 @@ impl<'n> Kept<'n> {
         self.keeping.pass_over(1);
     }
 
-    /// Reads a section for so many entries, if these are known yet; `find` tells which of them have a tag.
+    /// Reads a section for so many entries, if these are known yet; `find` tells which of them have a tag, as long as these are
+    /// new to the step.
     fn section<'a, V: Values<'a>>(
         &mut self,
         on: On,
         mut values: V,
         count: Option<usize>,
-        find: impl Fn(u64, &mut dyn FnMut(usize)) -> Result<(), SectionError>,
+        find: impl Fn(u64, &mut dyn FnMut(usize) -> bool) -> Result<(), SectionError>,
     ) -> Result<(), MshError> {
         let section = if on == On::Points { super::views::SECTION } else { OF_ELEMENTS };
         let head = match head(&mut values) {
@@ -132,7 +138,7 @@ impl<'n> Kept<'n> {
             steps_before: 0,
             is_sound: is_admitted,
             values: vec![f64::NAN; components * count],
-            of_step: vec![0; if is_admitted { count } else { 0 }],
+            of_step: vec![NEVER; if is_admitted { count } else { 0 }],
         });
         let number = self.views.len() - 1;
         self.numbers.insert((on, head.name.clone()), number);
@@ -143,7 +149,7 @@ impl<'n> Kept<'n> {
     pub fn finish(mut self, elements: Option<&Elements>, notes: &mut Notes) -> Fields {
         for view in self.views.into_iter().filter(|view| view.is_sound) {
             if view.steps_before > 0 {
-                let (name, step) = (&view.name, view.step);
+                let (name, step) = (escape(view.name.as_bytes()), view.step);
                 self.keeping.remark(format_args!(
                     "the view {name} has several steps of time: the last one in the file, {step}, is kept"
                 ));
@@ -164,7 +170,7 @@ impl View {
         if step != self.step {
             self.step = step;
             // As many as there are sections at most.
-            self.steps_before = self.steps_before.saturating_add(1);
+            self.steps_before = (self.steps_before + 1).min(NEVER - 1);
         }
     }
 
@@ -184,20 +190,25 @@ impl View {
         head: &Head,
         values: &mut V,
         section: &'static str,
-        find: impl Fn(u64, &mut dyn FnMut(usize)) -> Result<(), SectionError>,
+        find: impl Fn(u64, &mut dyn FnMut(usize) -> bool) -> Result<(), SectionError>,
     ) -> Result<(), SectionError> {
         let components = self.components;
         let bytes = V::INT.saturating_add(V::DOUBLE.saturating_mul(components as u64));
         fits(values, "values of a view", head.entries, bytes, u64::MAX)?;
-        let mut entry = vec![0.0; components];
+        // Where there are entries, so many components fit in the file.
+        let mut entry = vec![0.0; if head.entries > 0 { components } else { 0 }];
         for _ in 0..head.entries {
             let tag = values.natural()?;
             for number in &mut entry {
                 *number = values.double()?;
             }
             find(tag, &mut |at| {
-                self.values[components * at..][..components].copy_from_slice(&entry);
-                self.of_step[at] = self.steps_before;
+                let is_new = self.of_step[at] != self.steps_before;
+                if is_new {
+                    self.values[components * at..][..components].copy_from_slice(&entry);
+                    self.of_step[at] = self.steps_before;
+                }
+                is_new
             })?;
         }
         super::views::expect_end(values, section)

@@ -146,9 +146,28 @@ fn what_is_wrong_with_a_view_is_told_and_the_others_are_kept() {
         let (found, remarks) = early(section, before);
         assert!(found.are_none() && remarks[0].contains("it stands before what it belongs to"), "{remarks:?}");
     }
+    // Without nodes there is nothing to keep, however many components are declared.
+    let empty = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n0\n$EndNodes\n$NodeData\n1\n\"h\"\n1\n0\n3\n0\n200000000\n0\n$EndNodeData\n$Elements\n0\n$EndElements\n";
+    assert!(content(empty.as_bytes()).is_err());
     let many = "$NodeData\n1\n\"h\"\n1\n0\n3\n0\n18446744073709551615\n0\n$EndNodeData\n";
     let refused = content(&text(many)).expect_err("too many").reason();
     assert!(refused.code == Code::TooLarge && refused.message.contains("values of arrays exceed"), "{refused:?}");
+}
+
+/// Very many elements of one tag, and values for it as often.
+#[test]
+fn tags_that_are_the_same_take_no_time() {
+    const MANY: usize = 60_000;
+    let elements = "1 2 2 0 0 1 2 3\n".repeat(MANY);
+    let values = "1 0.5\n".repeat(MANY);
+    let text = format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n\
+         $Elements\n{MANY}\n{elements}$EndElements\n$ElementData\n1\n\"e\"\n1\n0\n3\n0\n1\n{MANY}\n{values}$EndElementData\n"
+    );
+    let begun = std::time::Instant::now();
+    let (found, _) = kept(text.as_bytes());
+    assert_floats(&found.cells[0], "e", &[0.5; MANY]);
+    assert!(begun.elapsed().as_secs() < 10, "{:?}", begun.elapsed());
 }
 
 #[test]

@@ -83,12 +83,8 @@ fn what_stands_before_damage_is_kept() {
     };
     for (rest, told, remarks) in [
         ("SPLINES a int\n1 2\n", "arrays behind the damage are not kept: line 12: unexpected \"SPLINES\"", 2),
-        ("SCALARS q int\n1 2.5\n", "the array \"q\" of cells is not kept: line 12: \"2.5\" is no value of \"q\"", 1),
-        (
-            "SCALARS q int 3\n1 2\n",
-            "arrays behind the damage are not kept: line 12: an array of POINT_DATA and CELL_DATA should",
-            2,
-        ),
+        ("SCALARS q int\n1 2.5\n", "the array \"q\" of cells is not kept: line 13: \"2.5\" is no value of \"q\"", 1),
+        ("SCALARS q int 3\n1 2\n", "an array of POINT_DATA and CELL_DATA should have", 2),
         ("SCALARS p float\n1 2\n", "the array \"p\" of cells is not kept: another one before it has the same name", 1),
     ] {
         let (found, told_of) = kept(&file(rest));
