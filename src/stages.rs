@@ -1,7 +1,7 @@
 //! What each stage does with an input: values in, values out. The threads are in [`crate::conveyor`].
 
 use crate::export;
-use crate::formats::{Label, glb, surface_obj, vtm, vtp, vtu, welded};
+use crate::formats::{Fields, Label, glb, surface_obj, vtm, vtp, vtu, welded};
 use crate::outcome::{Abort, Code, Reason};
 use crate::report::{
     self, CertifiedFacts, Decomposition, Facts, Input, Output, RefusedComponent, Report, SurfaceFacts,
@@ -199,7 +199,16 @@ pub fn encodings(settings: &Settings) -> Vec<Encoding> {
     encodings
 }
 
-/// Encodes files of one kind. `labels` are those of the input.
+/// What the input tells of its surface beside that, and goes into the files of a result.
+#[derive(Clone, Copy, Debug)]
+pub struct Told<'a> {
+    /// The parts that have names.
+    pub labels: &'a [Label],
+    /// The arrays, with an entry for each vertex after welding.
+    pub fields: &'a Fields,
+}
+
+/// Encodes files of one kind. `told` is what the input tells.
 ///
 /// # Errors
 /// Where the result cannot be encoded, a fault of planish; the refusal of a surface that a file asked for cannot hold; or that
@@ -207,15 +216,16 @@ pub fn encodings(settings: &Settings) -> Vec<Encoding> {
 pub fn encode(
     encoding: Encoding,
     atlas: &CertifiedAtlas,
-    labels: &[Label],
+    told: Told,
     settings: &Settings,
     monitor: &dyn Monitor,
 ) -> Result<Encoded, Abort> {
+    let Told { labels, fields } = told;
     let mut encoded = Encoded::default();
     encoded.files = match encoding {
-        Encoding::Surface => vec![(result_files::SURFACE.to_owned(), vtu::surface(atlas, labels))],
+        Encoding::Surface => vec![(result_files::SURFACE.to_owned(), vtu::surface(atlas, labels, fields))],
         Encoding::Param => vec![(result_files::PARAM.to_owned(), vtu::param(atlas, labels))],
-        Encoding::Beside => encode_beside(atlas, labels)?,
+        Encoding::Beside => encode_beside(atlas, told)?,
         Encoding::Also(also) => vec![encode_also(also, atlas, labels)?],
         Encoding::HandOff => {
             let export = export::gmsh(atlas, &wanted(atlas, labels, settings), monitor).map_err(unwanted)?;
@@ -252,13 +262,8 @@ fn wanted<'a>(atlas: &CertifiedAtlas, labels: &'a [Label], settings: &Settings) 
 }
 
 /// What is known of an atlas of which all files are `encoded`, in the order of [`encodings`], and these. `whole` is how many charts
-/// decomposition made; `labels` are those of the input.
-pub fn assemble(
-    atlas: &CertifiedAtlas,
-    whole: usize,
-    labels: &[Label],
-    encoded: Vec<Encoded>,
-) -> (CertifiedFacts, Files) {
+/// decomposition made; `told` is what the input tells.
+pub fn assemble(atlas: &CertifiedAtlas, whole: usize, told: Told, encoded: Vec<Encoded>) -> (CertifiedFacts, Files) {
     let (mut files, mut outputs, mut hand_off, mut mmg) = (Files::new(), Vec::new(), None, None);
     for one in encoded {
         files.extend(one.files);
@@ -267,7 +272,8 @@ pub fn assemble(
         mmg = mmg.or(one.mmg);
     }
     let facts = CertifiedFacts {
-        labels: report::labels(atlas, labels),
+        labels: report::labels(atlas, told.labels),
+        fields: report::fields(told.fields),
         charts: report::charts(atlas),
         charts_by_splitting: atlas.charts().len() - whole,
         seams: report::seams(atlas.seams()),
@@ -293,11 +299,12 @@ pub fn finish(input: Input, found: Repaired, atlas: Atlas, settings: &Settings) 
         done.extend(ChartJob::new(chart, of_charts).run(&NoMonitor).map_err(not_mapped)?);
     }
     let atlas = gather(found.mesh, done, settings)?;
+    let told = Told { labels: &[], fields: &Fields::default() };
     let mut encoded = Vec::new();
     for encoding in encodings(settings) {
-        encoded.push(encode(encoding, &atlas, &[], settings, &NoMonitor)?);
+        encoded.push(encode(encoding, &atlas, told, settings, &NoMonitor)?);
     }
-    let (certified, files) = assemble(&atlas, whole, &[], encoded);
+    let (certified, files) = assemble(&atlas, whole, told, encoded);
     Ok((facts.certified(settings, certified), files))
 }
 
@@ -308,13 +315,13 @@ fn warn_if_unsolved(certified: &CertifiedChart) {
 }
 
 /// Encodes what else ParaView shows.
-fn encode_beside(atlas: &CertifiedAtlas, labels: &[Label]) -> Result<Files, Reason> {
+fn encode_beside(atlas: &CertifiedAtlas, Told { labels, fields }: Told) -> Result<Files, Reason> {
     let mut files = vec![(result_files::SEAMS.to_owned(), vtp::seams(atlas, labels).map_err(not_encoded)?)];
     let mut parts = Vec::new();
     for (label, Label { name, group, .. }) in labels.iter().enumerate() {
         let file = result_files::surface_of(group);
         parts.push(vtm::Block::file(name, &file));
-        files.push((file, vtu::part(atlas, labels, label)));
+        files.push((file, vtu::part(atlas, labels, label, fields)));
     }
     let surface = match parts.len() {
         0 => vtm::Content::File(result_files::SURFACE.to_owned()),

@@ -7,6 +7,7 @@ mod corpus;
 mod daemon;
 mod doubts;
 mod every_mesh;
+mod fields;
 mod fixtures;
 mod foreign;
 mod full;

@@ -87,9 +87,10 @@ fn read_here(in_flight: Arc<InFlight>, next: &Next) {
     facts.input.beside = folder.read();
     match decoded {
         Ok(Decoded::Fresh(content)) => {
-            let Content { soup, notes } = *content;
+            let Content { soup, fields, notes } = *content;
             warn_of_doubts(&in_flight, &notes);
             facts.content = Some(notes);
+            facts.fields = Arc::new(fields);
             hand_on(&next.soups, Soup { in_flight, facts, soup });
         }
         Ok(Decoded::UpToDate(older)) => leave(in_flight.clone(), *older, next),
@@ -115,11 +116,12 @@ fn decode(in_flight: &InFlight, bytes: &[u8], facts: &mut Facts, folder: &Folder
     if let Some(older) = up_to_date(in_flight, &facts.input, folder) {
         return Ok(Decoded::UpToDate(Box::new(older)));
     }
-    let content = input::decode(&in_flight.job.path, bytes, &in_flight.settings, folder).map_err(|refusal| {
+    let mut content = input::decode(&in_flight.job.path, bytes, &in_flight.settings, folder).map_err(|refusal| {
         facts.content = refusal.notes.map(|notes| *notes);
         refusal.reason
     })?;
-    input::check_memory(&content.soup, &in_flight.settings)?;
+    input::check_memory(&content.soup, &content.fields, &in_flight.settings)?;
+    content.fields = content.fields.by_vertex(&content.soup);
     Ok(Decoded::Fresh(Box::new(content)))
 }
 

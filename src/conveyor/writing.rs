@@ -8,7 +8,7 @@ use crate::outcome::{Abort, Code, Reason};
 use crate::output::publish::{self, PublishError, Publisher, Staged};
 use crate::report::{Facts, Report};
 use crate::result_files;
-use crate::stages::{self, Encoded, Files};
+use crate::stages::{self, Encoded, Files, Told};
 use crate::system::passing;
 use bytesize::ByteSize;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
@@ -110,11 +110,12 @@ fn assembled(
 ) -> Result<(Report, Files), Abort> {
     let settings = &in_flight.settings;
     let labels = facts.content.as_ref().map_or(&[][..], |content| &content.labels);
+    let told = Told { labels, fields: &facts.fields };
     let atlas = in_flight.compute(Stage::Write, |_| {
         let (mesh, charts) = done?;
         stages::gather(mesh, charts.into_iter().flatten().collect(), settings)
     })?;
-    let encoding = |one| in_flight.compute(Stage::Write, |m| stages::encode(one, &atlas, labels, settings, m));
+    let encoding = |one| in_flight.compute(Stage::Write, |m| stages::encode(one, &atlas, told, settings, m));
     let encoded: Result<Vec<Encoded>, Abort> = std::thread::scope(|scope| {
         let encoding = &encoding;
         let start = |one| {
@@ -130,7 +131,7 @@ fn assembled(
     });
     let encoded = encoded?;
     in_flight.compute(Stage::Write, |_| {
-        let (certified, files) = stages::assemble(&atlas, whole, labels, encoded);
+        let (certified, files) = stages::assemble(&atlas, whole, told, encoded);
         Ok((facts.clone().certified(settings, certified), not_too_large(files, in_flight)?))
     })
 }

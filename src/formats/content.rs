@@ -1,5 +1,6 @@
 //! What readers are given, and what they give.
 
+use super::fields::Fields;
 use super::labels::Label;
 use crate::settings::{LabelSource, Limits};
 use planish_core::mesh::TriangleSoup;
@@ -25,12 +26,14 @@ pub struct Source<'a> {
     pub labels: &'a LabelSource,
     /// The array of points that tells sizes, where one is asked for.
     pub sizes: Option<&'a str>,
+    /// Whether arrays of points and cells are kept.
+    pub keeps_fields: bool,
 }
 
 impl<'a> Source<'a> {
-    /// A file with nothing beside it, whose parts have the names that are usual.
+    /// A file with nothing beside it, whose parts have the names that are usual, and of which all is kept.
     pub fn alone(bytes: &'a [u8], limits: &'a Limits) -> Self {
-        Self { bytes, limits, beside: &NoSiblings, labels: &LabelSource::Usual, sizes: None }
+        Self { bytes, limits, beside: &NoSiblings, labels: &LabelSource::Usual, sizes: None, keeps_fields: true }
     }
 }
 
@@ -90,6 +93,8 @@ impl TooMany {
 pub struct Content {
     /// Its triangles.
     pub soup: TriangleSoup,
+    /// What it tells at its points and cells.
+    pub fields: Fields,
     /// What else there is to tell.
     pub notes: Notes,
 }

@@ -1,5 +1,6 @@
 //! How every reader ends: points, triangles and notes become what a file holds, or its refusal.
 
+use super::fields::Fields;
 use super::labels::Labels;
 use super::location::Location;
 use super::{Content, Notes, ReadError};
@@ -50,7 +51,10 @@ pub(super) fn content(
         return Err(ReadError::NoSurface { found: found.join(", "), remedy, notes: Box::new(notes) });
     }
     let error = match TriangleSoup::new(points, triangles) {
-        Ok(soup) => return Ok(Content { soup: labels.apply(soup, &mut notes), notes }),
+        Ok(soup) => {
+            let soup = labels.apply(soup, &mut notes);
+            return Ok(Content { soup, fields: Fields::default(), notes });
+        }
         Err(error) => error,
     };
     let location = match error {

@@ -1,6 +1,7 @@
 //! File formats: which there are, and reading a soup of triangles from the bytes of a file.
 
 mod content;
+pub mod fields;
 mod finish;
 mod gltf;
 pub mod gmsh;
@@ -32,11 +33,12 @@ mod words;
 use crate::outcome::{Code, Reason};
 pub use crate::settings::{LabelSource, Limits};
 pub use content::{Content, NoSiblings, Notes, SiblingFiles, Source, TooMany};
+pub use fields::Fields;
 pub use gltf::glb;
 pub use joined::JoinedVertices;
 pub use labels::{Label, LabelError, label_index};
-pub use made::{MadeFormat, MadeMesh};
 use location::Location;
+pub use made::{MadeFormat, MadeMesh};
 pub use obj::surface as surface_obj;
 pub use patches::Patches;
 use planish_core::mesh::SoupError;
@@ -393,7 +395,7 @@ pub fn read_patches(format: Format, source: &Source) -> Result<Patches, ReadErro
         let bytes = source.bytes.strip_prefix(sniff::MARK).unwrap_or(source.bytes);
         return msh::read_patches(&Source { bytes, ..*source });
     }
-    let soup = read(format, source)?.soup;
+    let soup = read(format, &Source { keeps_fields: false, ..*source })?.soup;
     let triangles = soup.triangles().len();
     Ok(Patches::new(&soup, vec![None; triangles], None))
 }

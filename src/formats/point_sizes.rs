@@ -70,7 +70,7 @@ pub(super) struct PointSizes {
 /// What a file holds, with sizes where any are asked for. At how many corners they are no lengths is told.
 pub(super) fn give(content: Content, sizes: Option<PointSizes>) -> Content {
     let Some(PointSizes { array, values }) = sizes else { return content };
-    let Content { soup, mut notes } = content;
+    let Content { soup, fields, mut notes } = content;
     let mut is_corner = vec![false; values.len()];
     soup.triangles().iter().flatten().for_each(|corner| is_corner[*corner as usize] = true);
     let corners = is_corner.iter().filter(|is_corner| **is_corner).count();
@@ -81,19 +81,19 @@ pub(super) fn give(content: Content, sizes: Option<PointSizes>) -> Content {
             "at {none} of the {corners} corners of triangles {array} is no positive number: there it asks for no length of edges"
         ));
     }
-    Content { soup: soup.with_sizes(values), notes }
+    Content { soup: soup.with_sizes(values), fields, notes }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::Notes;
+    use crate::formats::{Fields, Notes};
 
     #[test]
     fn values_that_are_no_lengths_ask_for_nothing_and_are_counted_at_corners() {
         let points = (0..7).map(|k| [f64::from(k), f64::from(k * k), 0.0]).collect();
         let soup = TriangleSoup::new(points, vec![[0, 1, 2], [1, 3, 4], [1, 4, 5]]).expect("a soup");
-        let content = Content { soup, notes: Notes::new("a format") };
+        let content = Content { soup, fields: Fields::default(), notes: Notes::new("a format") };
         let sizes = |values| PointSizes { array: "h".to_owned(), values };
         let values = vec![0.5, f64::NAN, 0.0, -1.0, f64::INFINITY, 1e300, f64::NAN];
         let found = give(content.clone(), Some(sizes(values)));

@@ -1,7 +1,7 @@
 //! From the bytes of a file to a soup of triangles, by its name; and whether there is the memory for that surface.
 
 use super::siblings::Folder;
-use crate::formats::{self, Content, Kind, READ, Refusal, Source};
+use crate::formats::{self, Content, Fields, Kind, READ, Refusal, Source};
 use crate::outcome::{Code, Reason};
 use crate::settings::Settings;
 use bytesize::ByteSize;
@@ -13,6 +13,10 @@ use std::path::Path;
 /// (`cargo run --release --example decode -- --cut`), so that readers do not count.
 pub const MEMORY_PER_TRIANGLE: u64 = 1500;
 
+/// How often the values of arrays are in memory at most: as they are kept, and on all nodes of the surface, of which there are four
+/// times as many as vertices, while an array is written.
+const COPIES_OF_FIELDS: u64 = 5;
+
 /// Decodes the bytes of the file at `path` by its extension; others may lie beside it in `folder`.
 ///
 /// # Errors
@@ -22,7 +26,8 @@ pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -
     match formats::kind(path) {
         Kind::Mesh(format) => {
             let sizes = settings.size_from.as_deref();
-            let source = Source { bytes, limits: &settings.limits, beside: folder, labels: &settings.labels, sizes };
+            let (limits, labels) = (&settings.limits, &settings.labels);
+            let source = Source { bytes, limits, beside: folder, labels, sizes, keeps_fields: true };
             formats::read_or_tell(format, &source)
         }
         Kind::OtherMesh(e) => refuse(
@@ -41,12 +46,13 @@ pub fn decode(path: &Path, bytes: &[u8], settings: &Settings, folder: &Folder) -
     }
 }
 
-/// Whether there is the memory that a surface will take.
+/// Whether there is the memory that a surface and its fields will take.
 ///
 /// # Errors
 /// The refusal of one that takes more than an input may, or than there is.
-pub fn check_memory(soup: &TriangleSoup, settings: &Settings) -> Result<(), Reason> {
-    let needed = MEMORY_PER_TRIANGLE.saturating_mul(soup.triangles().len() as u64);
+pub fn check_memory(soup: &TriangleSoup, fields: &Fields, settings: &Settings) -> Result<(), Reason> {
+    let of_surface = MEMORY_PER_TRIANGLE.saturating_mul(soup.triangles().len() as u64);
+    let needed = of_surface.saturating_add(fields.bytes().saturating_mul(COPIES_OF_FIELDS));
     let (limit, remedy) = match settings.job_memory {
         Some(limit) if limit <= settings.machine_memory => (limit, "raise job-memory"),
         _ => (settings.machine_memory, "give the machine, or its container, more memory"),

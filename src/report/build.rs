@@ -1,9 +1,10 @@
 //! From the core's numbers to the report's.
 
 use super::{
-    Boundary, BoundaryShape, Certificate, ChartBoundary, ChartReport, Counts, Distortion, LabelReport, Linear,
-    Quadratic, RepairedSurface, Repairs, Seam, Seams, Surface, Untangle,
+    Boundary, BoundaryShape, Certificate, ChartBoundary, ChartReport, Counts, Distortion, FieldOwner, FieldReport,
+    LabelReport, Linear, Quadratic, RepairedSurface, Repairs, Seam, Seams, Surface, Untangle,
 };
+use crate::formats::fields::{Field, Fields};
 use crate::formats::layout::{Placement, layout};
 use crate::formats::{Label, label_index};
 use planish_core::atlas::Chart;
@@ -57,6 +58,19 @@ pub fn labels(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<LabelReport> {
         report.area += chart.chart().true_area();
     }
     reports
+}
+
+/// The fields of the input in surface.vtu.
+pub fn fields(fields: &Fields) -> Vec<FieldReport> {
+    let report = |field: &Field, on| FieldReport {
+        name: field.name.clone(),
+        input_name: field.input_name.clone(),
+        on,
+        components: field.components,
+        integer: field.values.are_integers(),
+    };
+    let points = fields.points.iter().map(|field| report(field, FieldOwner::Points));
+    points.chain(fields.cells.iter().map(|field| report(field, FieldOwner::Cells))).collect()
 }
 
 /// What repair did.

@@ -2,13 +2,14 @@
 //! the end. So a report never holds what a stage that broke down has left behind.
 
 use super::{
-    ChartReport, Decomposition, ExportReport, Input, LabelReport, MmgReport, Output, Refinement, RefusedComponent,
-    Repairs, Report, Seams, Surface, Warning,
+    ChartReport, Decomposition, ExportReport, FieldReport, Input, LabelReport, MmgReport, Output, Refinement,
+    RefusedComponent, Repairs, Report, Seams, Surface, Warning,
 };
-use crate::formats::Notes;
+use crate::formats::{Fields, Notes};
 use crate::outcome::{Reason, Status};
 use crate::settings::Settings;
 use planish_core::repair::Repaired;
+use std::sync::Arc;
 
 /// What is known of an input.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +18,8 @@ pub struct Facts {
     pub input: Input,
     /// What it holds beside its triangles; none where it was not read to its end.
     pub content: Option<Notes>,
+    /// What it tells at points and cells, with an entry for each vertex after welding.
+    pub fields: Arc<Fields>,
     /// Its surface; none where it was not repaired.
     pub surface: Option<SurfaceFacts>,
 }
@@ -43,6 +46,8 @@ pub struct SurfaceFacts {
 pub struct CertifiedFacts {
     /// The parts of its surface that have names.
     pub labels: Vec<LabelReport>,
+    /// The fields of the input on it.
+    pub fields: Vec<FieldReport>,
     /// Its charts.
     pub charts: Vec<ChartReport>,
     /// How many of them there are more than decomposition made.
@@ -74,7 +79,7 @@ impl SurfaceFacts {
 impl Facts {
     /// What is known of an input before it is decoded.
     pub fn new(input: Input) -> Self {
-        Self { input, content: None, surface: None }
+        Self { input, content: None, fields: Arc::default(), surface: None }
     }
 
     /// The report of an input for which there are no maps yet: all that is known, and no result.
@@ -96,11 +101,11 @@ impl Facts {
 
     /// The report of an input that is certified, but for components that are refused.
     pub fn certified(self, settings: &Settings, certified: CertifiedFacts) -> Report {
-        let CertifiedFacts { labels, charts, charts_by_splitting, seams, hand_off, mmg, outputs } = certified;
+        let CertifiedFacts { labels, fields, charts, charts_by_splitting, seams, hand_off, mmg, outputs } = certified;
         let report = self.report(settings);
         let decomposition = report.decomposition.map(|d| Decomposition { charts_by_splitting, ..d });
         let status = Status::Certified;
-        Report { status, decomposition, labels, charts, seams, hand_off, mmg, outputs, ..report }
+        Report { status, decomposition, labels, fields, charts, seams, hand_off, mmg, outputs, ..report }
     }
 
     /// The report of an input that is refused, or failed, for this reason.

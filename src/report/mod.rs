@@ -10,7 +10,7 @@ use crate::formats::{Label, Notes};
 use crate::outcome::{Reason, Status};
 use crate::settings::{self, LabelSource, Settings};
 use crate::system::escape::printable_json;
-pub use build::{certificate, chart_checksum, charts, labels, repairs, seams, surface};
+pub use build::{certificate, chart_checksum, charts, fields, labels, repairs, seams, surface};
 pub use facts::{CertifiedFacts, Facts, SurfaceFacts};
 use planish_core::Order;
 use serde::{Deserialize, Serialize};
@@ -57,6 +57,9 @@ pub struct Report {
     /// The parts of the surface that have names.
     #[serde(default)]
     pub labels: Vec<LabelReport>,
+    /// The arrays of the input in surface.vtu.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fields: Vec<FieldReport>,
     /// The charts.
     pub charts: Vec<ChartReport>,
     /// The curves between charts.
@@ -228,6 +231,32 @@ pub struct LabelReport {
     pub triangles: usize,
     /// Its area, in the unit of the input, squared.
     pub area: f64,
+}
+
+/// An array of the input in surface.vtu.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FieldReport {
+    /// Its name there.
+    pub name: String,
+    /// Its name in the input, where that is another.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input_name: Option<String>,
+    /// What it has entries for.
+    pub on: FieldOwner,
+    /// How many numbers make an entry.
+    pub components: usize,
+    /// Whether they are whole ones.
+    pub integer: bool,
+}
+
+/// What a field has entries for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FieldOwner {
+    /// For points.
+    Points,
+    /// For cells.
+    Cells,
 }
 
 /// A surface before and after repair.
@@ -742,6 +771,7 @@ impl Report {
             decomposition: None,
             refinement: None,
             labels: vec![],
+            fields: vec![],
             charts: vec![],
             seams: Seams::default(),
             hand_off: None,

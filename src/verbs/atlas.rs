@@ -29,8 +29,6 @@ pub(super) struct AtlasOnDisk {
     pub labels: Vec<Label>,
     /// Per chart, the position of its part among these.
     pub part_of_chart: Vec<Option<usize>>,
-    /// The size that meshers were asked for; none where there was no hand-off.
-    pub size: Option<f64>,
     /// The bytes of surface.vtu.
     pub bytes: Vec<u8>,
 }
@@ -49,14 +47,14 @@ impl AtlasOnDisk {
         let grid = vtu::read(&bytes).map_err(|e| broken(e.to_string()))?;
         let tags = vtu::read_labels(&bytes).map_err(|e| broken(e.to_string()))?;
         let charts: Vec<u32> = grid.chart.iter().map(|chart| u32::try_from(*chart).unwrap_or(u32::MAX)).collect();
-        let surface = ChartedSurface::new(&grid.points, &grid.uv, &grid.cells, &charts).map_err(|e| broken(e.to_string()))?;
+        let surface =
+            ChartedSurface::new(&grid.points, &grid.uv, &grid.cells, &charts).map_err(|e| broken(e.to_string()))?;
         let labels: Vec<Label> = report.labels.iter().map(|label| label.label.clone()).collect();
         let mut part_of_chart = vec![None; surface.charts()];
         for (chart, tag) in charts.iter().zip(tags.iter().flatten()) {
             part_of_chart[*chart as usize] = labels.iter().position(|label| label.tag == *tag);
         }
-        let size = report.hand_off.as_ref().map(|gmsh| gmsh.size).or(report.mmg.as_ref().map(|mmg| mmg.size));
-        Ok(Self { surface, grid, labels, part_of_chart, size, bytes })
+        Ok(Self { surface, grid, labels, part_of_chart, bytes })
     }
 }
 

@@ -55,7 +55,7 @@ fn answer(job: &Job, settings: &Settings) -> Answer {
             settings,
             &Folder::of_job(job),
         );
-        let Content { soup, notes } = found.map_err(|refusal| {
+        let Content { soup, notes, .. } = found.map_err(|refusal| {
             content = refusal.notes.map(|notes| *notes);
             refusal.reason
         })?;

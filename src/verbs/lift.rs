@@ -138,8 +138,7 @@ fn projected(
     settings: &Settings,
 ) -> Result<(Lifted, Option<f64>), NotLifted> {
     let found = planar_input::read_in_space(mesh, settings);
-    let (points, triangles, charts) =
-        found.map_err(|problem| NotLifted::Mesh { mesh: mesh.to_owned(), problem })?;
+    let (points, triangles, charts) = found.map_err(|problem| NotLifted::Mesh { mesh: mesh.to_owned(), problem })?;
     let nearest = Nearest::new(&atlas.surface);
     let (lifted, farthest) = lift::project(&nearest, &points, &triangles, charts.as_deref(), elements);
     Ok((lifted, Some(farthest)))

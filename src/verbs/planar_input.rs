@@ -122,7 +122,8 @@ fn read_with_charts(path: &Path, settings: &Settings) -> Result<Charted, String>
         let labels = LabelSource::Array(array.to_owned());
         // Where there is no such array the file is refused: then it tells nothing.
         let Ok(content) = formats::read(format, &Source { labels: &labels, ..plain }) else { continue };
-        let numbers: Option<Vec<usize>> = content.notes.labels.iter().map(|label| number_in(&label.name, first)).collect();
+        let numbers: Option<Vec<usize>> =
+            content.notes.labels.iter().map(|label| number_in(&label.name, first)).collect();
         if let Some(numbers) = numbers.filter(|_| !content.soup.labels().is_empty()) {
             let charts = content.soup.labels().iter().map(|label| numbers[*label as usize]).collect();
             return Ok((content.soup.points().to_vec(), content.soup.triangles().to_vec(), Some(charts)));
@@ -143,7 +144,10 @@ mod tests {
     #[test]
     fn charts_are_told_by_names() {
         let of = |name: &str| chart_of_name(Path::new(name));
-        assert_eq!((of("mmg/chart-012.o.mesh"), of("chart-1.stl"), of("part.stl"), of("chart-x.stl")), (Some(12), Some(1), None, None));
+        assert_eq!(
+            (of("mmg/chart-012.o.mesh"), of("chart-1.stl"), of("part.stl"), of("chart-x.stl")),
+            (Some(12), Some(1), None, None)
+        );
         assert_eq!((number_in("ref_7", 1), number_in("chart_0", 0), number_in("ref_0", 1)), (Some(6), Some(0), None));
     }
 }

@@ -73,7 +73,9 @@ impl<'a> Joined<'a> {
     fn add_inner(&self, part: &PlanarPart, numbers: &mut [u32], lifted: &mut Lifted) {
         let chart = self.surface.chart(part.chart);
         for (node, uv) in part.uv.iter().enumerate() {
-            if numbers[node] == u32::MAX && let Some(located) = chart.map.to_space(*uv) {
+            if numbers[node] == u32::MAX
+                && let Some(located) = chart.map.to_space(*uv)
+            {
                 numbers[node] = lifted.points.len() as u32;
                 lifted.push(chart.placed(&located));
             }
@@ -115,9 +117,7 @@ impl<'a> Joined<'a> {
             }
         }
         match alone {
-            Some((chart, node)) => {
-                Err(Error::NotConforming { chart, nodes: count, at: lifted.points[node as usize] })
-            }
+            Some((chart, node)) => Err(Error::NotConforming { chart, nodes: count, at: lifted.points[node as usize] }),
             None => Ok(lifted),
         }
     }

@@ -45,7 +45,9 @@ impl<'a> Middles<'a> {
         if is_open {
             let [a, b] = ends.map(|n| numbers[n as usize]);
             let middle = *self.on_curves.entry([a.min(b), a.max(b)]).or_insert(next);
-            if middle == next && let Some(found) = chart.map.to_boundary(uv) {
+            if middle == next
+                && let Some(found) = chart.map.to_boundary(uv)
+            {
                 lifted.push(chart.of_boundary(&found));
             }
             return middle;

@@ -104,6 +104,7 @@ pub(crate) fn halve(mut mesh: SurfaceMesh, groups: &[Vec<EdgeId>]) -> Halved {
             middles[edge.index()] = VertexId::at(mesh.points.len());
             mesh.points.push(midpoint(mesh.points[from.index()], mesh.points[to.index()]));
             push_mean(&mut mesh.sizes, [from, to]);
+            mesh.middles.push(mesh.welded_ends([from, to]));
             mesh.welded.push(welded);
             ends.push([from, to]);
             faces.extend(sides.iter().map(|h| h.face()));

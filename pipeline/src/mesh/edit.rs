@@ -49,6 +49,7 @@ impl MeshEditor {
             return None;
         }
         push_mean(&mut self.mesh.sizes, ends[0]);
+        self.mesh.middles.push(self.mesh.welded_ends(ends[0]));
         let [p, q] = ends[0].map(|v| self.mesh.points[v.index()]);
         self.mesh.points.push(midpoint(p, q));
         self.mesh.welded.push(self.next_welded);

@@ -19,11 +19,13 @@ impl SurfaceMesh {
         let fans = VertexFans::across(&self.triangles, &self.edges, joins);
         // Copies of a vertex follow each other, so that the vertices of the input stay in front of those that were added.
         let (triangles, copied) = fans.numbered(&self.triangles);
+        let added_from = copied.partition_point(|v| v.index() < self.added_from);
         Self {
             points: copied.iter().map(|v| self.points[v.index()]).collect(),
             welded: copied.iter().map(|v| self.welded[v.index()]).collect(),
             sizes: copied.iter().filter_map(|v| self.sizes.get(v.index()).copied()).collect(),
-            added_from: copied.partition_point(|v| v.index() < self.added_from),
+            added_from,
+            middles: copied[added_from..].iter().filter_map(|v| self.middle_of(*v)).collect(),
             edges: EdgeTable::new(&triangles),
             triangles,
             ..self

@@ -17,4 +17,4 @@ pub use soup::{SoupError, TriangleSoup};
 pub use steps::{CoordinateSteps, FEW_STEPS};
 pub(crate) use surface::Patch;
 pub use surface::SurfaceMesh;
-pub(crate) use surface::{Sheets, SurfaceParts, push_mean, vertices_of};
+pub(crate) use surface::{Sheets, SurfaceParts, WeldedEnds, push_mean, vertices_of, welded_ends};

@@ -38,6 +38,8 @@ pub struct SurfaceMesh {
     pub(super) welded: Vec<u32>,
     /// Vertices from this one on are not of the input.
     pub(super) added_from: usize,
+    /// Per vertex from there on, the welded vertices half-way between which it lies.
+    pub(super) middles: Vec<WeldedEnds>,
     /// How many triangles refinement added.
     pub(super) by_refinement: usize,
     pub(super) edges: EdgeTable,
@@ -54,8 +56,17 @@ pub(crate) struct SurfaceParts {
     pub sizes: Vec<f64>,
     pub welded: Vec<u32>,
     pub added_from: usize,
+    pub middles: Vec<WeldedEnds>,
     pub edges: EdgeTable,
     pub metric: Metric,
+}
+
+/// The ends of an edge as welded vertices, the smaller first: the same for all copies of the edge.
+pub(crate) type WeldedEnds = [u32; 2];
+
+/// The ends of an edge, in their order.
+pub(crate) fn welded_ends([a, b]: [u32; 2]) -> WeldedEnds {
+    [a.min(b), a.max(b)]
 }
 
 /// Where the sheets of a surface met before each was given vertices of its own: that is to become seams, and is counted for
@@ -79,6 +90,8 @@ pub(crate) struct Patch {
     pub source: Vec<u32>,
     /// Vertices from this one on are not of the input.
     pub added_from: usize,
+    /// Per vertex from there on, the welded vertices half-way between which it lies.
+    pub middles: Vec<WeldedEnds>,
     /// What mollification added to the lengths of the surface.
     pub mollified_by: f64,
 }
@@ -94,11 +107,26 @@ pub(crate) fn push_mean(sizes: &mut Vec<f64>, ends: [VertexId; 2]) {
 impl SurfaceMesh {
     /// A surface of these parts, counted, unless its triangles are `counted` already.
     pub(crate) fn new(parts: SurfaceParts, sheets: Sheets, counted: Option<TopologySummary>) -> Self {
-        let SurfaceParts { points, triangles, source, labels, sizes, welded, added_from, edges, metric } = parts;
+        let SurfaceParts { points, triangles, source, labels, sizes, welded, added_from, middles, edges, metric } =
+            parts;
         let counted = counted.unwrap_or_else(|| TopologySummary::new(&triangles, &edges));
         let Sheets { nonmanifold_edges, nonmanifold_vertices } = sheets;
         let summary = TopologySummary { nonmanifold_edges, nonmanifold_vertices, ..counted };
-        Self { points, triangles, source, labels, sizes, welded, added_from, by_refinement: 0, edges, summary, metric }
+        let by_refinement = 0;
+        Self {
+            points,
+            triangles,
+            source,
+            labels,
+            sizes,
+            welded,
+            added_from,
+            middles,
+            by_refinement,
+            edges,
+            summary,
+            metric,
+        }
     }
 
     /// Checks what the surface knows of itself against what its triangles tell.
@@ -117,6 +145,7 @@ impl SurfaceMesh {
         assert_eq!((self.source.len(), self.metric.shapes.len(), self.metric.flagged.len()), (faces, faces, faces));
         assert_eq!((self.welded.len(), self.summary.vertices), (self.points.len(), self.points.len()));
         assert!(self.sizes.is_empty() || self.sizes.len() == self.points.len(), "sizes");
+        assert_eq!(self.added_from + self.middles.len(), self.points.len(), "middles");
     }
 
     /// The positions of the vertices, in the unit of the input.
@@ -150,6 +179,33 @@ impl SurfaceMesh {
         (vertex.index() < self.added_from).then(|| self.welded[vertex.index()])
     }
 
+    /// Of a vertex that was added, the two welded vertices half-way between which it lies, the smaller first; none of one of
+    /// the input. Vertices that stand for them come before it, so that what is known at the points of the input
+    /// ([`crate::repair::first_points`]) can be carried to all vertices in their order.
+    ///
+    /// ```
+    /// use planish_core::monitor::NoMonitor;
+    /// use planish_core::topology::VertexId;
+    /// use planish_core::{Plan, Settings, mesh::TriangleSoup, repair};
+    ///
+    /// // A square of two triangles, each of which is an ear: their common edge is split.
+    /// let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    /// let soup = TriangleSoup::new(points, vec![[0, 1, 2], [0, 2, 3]])?;
+    /// let settings = Settings::default();
+    /// let mesh = repair(&soup, &settings.repair)?.accepted()?.mesh;
+    /// let mesh = Plan::new(mesh, &settings, &NoMonitor)?.mesh;
+    /// assert_eq!((mesh.middle_of(VertexId(0)), mesh.middle_of(VertexId(4))), (None, Some([0, 2])));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn middle_of(&self, vertex: VertexId) -> Option<[u32; 2]> {
+        vertex.index().checked_sub(self.added_from).map(|added| self.middles[added])
+    }
+
+    /// The welded vertices at the ends of an edge.
+    pub(super) fn welded_ends(&self, ends: [VertexId; 2]) -> WeldedEnds {
+        welded_ends(ends.map(|v| self.welded[v.index()]))
+    }
+
     /// The length of edges that the input asks for at `vertex` ([`crate::mesh::TriangleSoup::with_sizes`]): of points that became
     /// one, the least; at a vertex that was added in the middle of an edge, the mean of its ends. None where it asks for nothing.
     pub fn given_size(&self, vertex: VertexId) -> Option<f64> {
@@ -179,11 +235,13 @@ impl SurfaceMesh {
 
     /// The part with these vertices and faces, both ascending.
     pub(crate) fn patch(&self, vertices: &[VertexId], faces: &[FaceId]) -> Patch {
+        let added_from = vertices.partition_point(|v| v.index() < self.added_from);
         Patch {
             points: vertices.iter().map(|v| self.points[v.index()]).collect(),
             welded: vertices.iter().map(|v| self.welded[v.index()]).collect(),
             source: faces.iter().map(|f| self.source[f.index()]).collect(),
-            added_from: vertices.partition_point(|v| v.index() < self.added_from),
+            added_from,
+            middles: vertices[added_from..].iter().filter_map(|v| self.middle_of(*v)).collect(),
             mollified_by: self.metric.mollified_by,
         }
     }
@@ -221,10 +279,23 @@ impl SurfaceMesh {
 
     /// A part as a surface of its own.
     pub(crate) fn of_patch(triangles: Vec<[VertexId; 3]>, edges: EdgeTable, metric: Metric, patch: Patch) -> Self {
-        let Patch { points, welded, source, added_from, .. } = patch;
+        let Patch { points, welded, source, added_from, middles, .. } = patch;
         let summary = TopologySummary::new(&triangles, &edges);
-        let (labels, sizes) = (Arc::default(), Vec::new());
-        Self { points, triangles, source, labels, sizes, welded, added_from, by_refinement: 0, edges, summary, metric }
+        let (labels, sizes, by_refinement) = (Arc::default(), Vec::new(), 0);
+        Self {
+            points,
+            triangles,
+            source,
+            labels,
+            sizes,
+            welded,
+            added_from,
+            middles,
+            by_refinement,
+            edges,
+            summary,
+            metric,
+        }
     }
 
     /// The total true area, in the unit of the input, squared.
@@ -298,6 +369,54 @@ mod tests {
             // Where cracks are closed, points move by less than a millionth.
             assert!((given - expected).abs() <= 1e-6 * expected, "{given} for {expected} at {point:?}");
         }
+    }
+
+    /// Values at the points of the input, carried to all vertices in their order: those of a linear function stay its values.
+    fn assert_carried(soup: &TriangleSoup, mesh: &SurfaceMesh) {
+        let first = repair::first_points(soup.points());
+        let highest = mesh.welded.iter().max().map_or(0, |welded| *welded as usize);
+        let mut values = vec![f64::NAN; highest + 1];
+        for (v, point) in mesh.points().iter().enumerate().map(|(v, point)| (VertexId::at(v), point)) {
+            let welded = mesh.welded_vertex(v);
+            values[welded as usize] = match mesh.middle_of(v) {
+                Some(ends) => ends.into_iter().map(|end| 0.5 * values[end as usize]).sum(),
+                None => linear(soup.points()[first[welded as usize] as usize]),
+            };
+            let (carried, expected) = (values[welded as usize], linear(*point));
+            assert!((carried - expected).abs() <= 1e-12 * expected, "{carried} for {expected} at {point:?}");
+            assert_eq!(mesh.middle_of(v).is_none(), mesh.input_vertex(v).is_some());
+        }
+    }
+
+    /// Edges are split thrice over, also those of two sheets, and those along which sheets meet inside a sheet.
+    #[test]
+    fn what_is_known_at_points_can_be_carried_to_all_vertices() {
+        let mut added = 0;
+        for soup in [shapes::book(3, 4), shapes::cracked_patch(), shapes::sphere(5), shapes::bow_tie(), fin()] {
+            let labels = (0..soup.triangles().len() as u32).map(|t| t % 3).collect();
+            let mesh = repair(&soup.clone().with_labels(labels), &Default::default()).expect("a surface").mesh;
+            let mut mesh = mesh.cut_between_labels();
+            for _ in 0..3 {
+                let some: Vec<Vec<EdgeId>> = mesh.edges().iter().step_by(3).map(|(edge, _)| vec![edge]).collect();
+                mesh = halve(mesh, &some).mesh;
+            }
+            assert_eq!(mesh.added_from + mesh.middles.len(), mesh.points().len());
+            assert_carried(&soup, &mesh);
+            let all: Vec<FaceId> = (0..mesh.triangles().len()).map(FaceId::at).collect();
+            let part = mesh.restricted(&all);
+            assert_eq!(part.middles, mesh.middles);
+            assert_carried(&soup, &part);
+            added += mesh.middles.len();
+        }
+        assert!(added > 100, "{added}");
+    }
+
+    /// A triangle on the middle of a square: it meets the sheet along a single edge inside that, which is halved.
+    fn fin() -> TriangleSoup {
+        let rim = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 3.0, 0.0], [0.0, 3.0, 0.0]];
+        let points = [&rim[..], &[[1.0, 1.5, 0.0], [2.0, 1.5, 0.0], [1.5, 1.5, 1.0]]].concat();
+        let triangles = vec![[0, 1, 4], [1, 5, 4], [1, 2, 5], [2, 3, 5], [3, 4, 5], [3, 0, 4], [4, 5, 6]];
+        TriangleSoup::new(points, triangles).expect("a soup")
     }
 
     /// Whatever becomes of vertices: sheets, borders of labels, parts, halved edges.

@@ -46,7 +46,8 @@ fn steps(field: &Field, face: u32) -> u32 {
     let mut change = 0.0_f64;
     for k in 0..3 {
         let next = (k + 1) % 3;
-        let around = [middles[k].apart(&corners[k]), middles[k].apart(&corners[next]), middles[k].apart(&middles[next])];
+        let around =
+            [middles[k].apart(&corners[k]), middles[k].apart(&corners[next]), middles[k].apart(&middles[next])];
         change = around.into_iter().fold(change, f64::max);
     }
     // Over half of a side.

@@ -40,12 +40,15 @@ impl Metric {
         // The smaller eigenvalue is the determinant over the larger one: their difference would cancel.
         let (half, apart) = (0.5 * (uu + vv), (0.5 * (uu - vv)).hypot(uv));
         let largest = half + apart;
+        if !largest.is_finite() {
+            // The map is beyond doubles there: nothing is known.
+            let m = 1.0 / (LONGEST * LONGEST);
+            return Self { uu: m, uv: 0.0, vv: m };
+        }
         let area = norm(cross(along_u, along_v));
         let least = if largest > 0.0 { area / largest * area } else { 0.0 };
         let held = |eigenvalue: f64| {
-            let length = size / eigenvalue.sqrt();
-            // What is no number is as if nothing were stretched.
-            let length = if length.is_nan() { LONGEST } else { length.clamp(SHORTEST, LONGEST) };
+            let length = (size / eigenvalue.sqrt()).clamp(SHORTEST, LONGEST);
             1.0 / (length * length)
         };
         Eigen { values: [held(largest), held(least)], direction: direction(uu, uv, vv) }.into_metric()

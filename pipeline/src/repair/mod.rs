@@ -22,7 +22,7 @@ mod slivers;
 mod t_junctions;
 pub(crate) mod weld;
 
-use crate::mesh::{Metric, Sheets, SurfaceMesh, SurfaceParts, TriangleSoup, push_mean};
+use crate::mesh::{Metric, Sheets, SurfaceMesh, SurfaceParts, TriangleSoup, WeldedEnds, push_mean, welded_ends};
 use crate::topology::{EdgeTable, TopologySummary, VertexFans};
 use crate::topology::{FaceId, HalfEdgeId, VertexId};
 use crate::vec3::{BoundingBox, Vec3, midpoint, unit_scale};
@@ -30,6 +30,7 @@ pub use sheets::{Accepted, RefusedComponent};
 use sheets::{MAX_SHEETS, MAX_TINY_SHEETS, TINY_SHEET};
 use std::sync::Arc;
 use t_junctions::Boundary;
+pub use weld::first_points;
 
 /// What repair may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,6 +188,8 @@ struct MeshBuilder {
     labels: Arc<[u32]>,
     /// Per point, the size that is asked for there, infinite for none; empty where there are none.
     sizes: Vec<f64>,
+    /// Per point that is not of the input, those half-way between which it lies.
+    middles: Vec<WeldedEnds>,
 }
 
 /// The points of a builder in a unit in which distances neither overflow nor underflow, and the tolerance in that unit.
@@ -359,6 +362,7 @@ impl MeshBuilder {
             let middle = VertexId::at(self.points.len());
             self.points.push(midpoint(self.points[a.index()], self.points[b.index()]));
             push_mean(&mut self.sizes, [a, b]);
+            self.middles.push(welded_ends([a.0, b.0]));
             cut.extend(sides.iter().map(|h| (*h, middle)));
             opened += 1;
         }
@@ -454,8 +458,10 @@ impl MeshBuilder {
         let counted = known.filter(|_| report.split_vertices.count == 0).cloned();
         let added_from = welded.partition_point(|w| (*w as usize) < input_points);
         let sizes = welded.iter().filter_map(|w| self.sizes.get(*w as usize).copied()).collect();
+        let middles = welded[added_from..].iter().map(|w| self.middles[*w as usize - input_points]).collect();
         let (source, labels) = (self.source, self.labels);
-        let parts = SurfaceParts { points, triangles, source, labels, sizes, welded, added_from, edges, metric };
+        let parts =
+            SurfaceParts { points, triangles, source, labels, sizes, welded, added_from, middles, edges, metric };
         SurfaceMesh::new(parts, Sheets { nonmanifold_edges, nonmanifold_vertices }, counted)
     }
 }

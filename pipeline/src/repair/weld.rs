@@ -20,7 +20,7 @@ pub(super) fn weld(soup: &TriangleSoup) -> (MeshBuilder, usize) {
     let triangles: Vec<_> = soup.triangles().iter().map(|t| t.map(|i| number[i as usize])).collect();
     let source = (0..triangles.len() as u32).collect();
     let sizes = least(soup.sizes(), &number, points.len());
-    (MeshBuilder { points, triangles, source, labels: soup.labels().clone(), sizes }, merged)
+    (MeshBuilder { points, triangles, source, labels: soup.labels().clone(), sizes, middles: vec![] }, merged)
 }
 
 /// The least of the sizes at points that became one, by the numbers of these; none where there are none.
@@ -31,6 +31,19 @@ pub(super) fn least(sizes: &[f64], number: &[VertexId], count: usize) -> Vec<f64
         *least = least.min(*size);
     }
     of_merged
+}
+
+/// Per vertex after welding ([`crate::mesh::SurfaceMesh::welded_vertex`]), the first of the points with its coordinates (0 and -0
+/// are equal).
+///
+/// ```
+/// use planish_core::repair::first_points;
+///
+/// assert_eq!(first_points(&[[0.0, 0.0, 1.0], [2.0, 0.0, 0.0], [-0.0, 0.0, 1.0], [3.0, 0.0, 0.0]]), [0, 1, 3]);
+/// ```
+pub fn first_points(points: &[Vec3]) -> Vec<u32> {
+    let first = first_by_table(points).unwrap_or_else(|| first_by_order(points));
+    (0..).zip(first).filter(|(point, first)| point == first).map(|(point, _)| point).collect()
 }
 
 /// Per point the number of the one that stands for all with equal coordinates (0 and -0 are equal), and these, in the order

@@ -20,6 +20,9 @@ mod tests {
     fn it_is_read_as_it_was_written() {
         let content = read_alone(Format::Medit, &made(&two())).expect("read");
         assert_eq!((content.soup.points(), content.soup.triangles()), (&two().points[..], &two().triangles[..]));
-        assert_eq!(content.notes.labels.iter().map(|label| label.name.as_str()).collect::<Vec<_>>(), ["ref_0", "ref_7"]);
+        assert_eq!(
+            content.notes.labels.iter().map(|label| label.name.as_str()).collect::<Vec<_>>(),
+            ["ref_0", "ref_7"]
+        );
     }
 }

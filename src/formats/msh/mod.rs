@@ -2,9 +2,11 @@
 //!
 //! The triangles and quads of all entities together are the surface. Elements of higher order are taken by their
 //! corners: the nodes in the middle of edges and faces are left out and counted. Points, lines and elements of volumes
-//! are counted by kind. Physical groups of surfaces are labels, and their names are told; a view of nodes tells sizes, if it
-//! is asked for; all other sections are passed over.
+//! are counted by kind. Physical groups of surfaces are labels, and their names are told; views of nodes and elements are
+//! fields, and one of nodes tells sizes, if it is asked for; all other sections are passed over.
 
+mod elements;
+mod fields;
 mod groups;
 mod nodes;
 mod plain;
@@ -20,7 +22,9 @@ use super::words::{Words, float};
 use super::{Content, Limits, Notes, Patches, ReadError, Source, TooMany};
 use crate::outcome::Code;
 use crate::settings::LabelSource;
+use fields::Kept;
 use groups::Groups;
+use memchr::memmem;
 use nodes::Nodes;
 use surface::Surface;
 use values::{Binary, SectionError, Text, Values};
@@ -212,15 +216,17 @@ enum Version {
 /// Reads an MSH file.
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let keep = if *source.labels == LabelSource::Ignored { Keep::Corners } else { Keep::Owners };
-    let Mesh { surface, groups, views, mut notes } = mesh(source, keep, Views::new(source.sizes))?;
+    let Mesh { surface, groups, views, kept, mut notes } =
+        mesh(source, keep, Views::new(source.sizes), Kept::new(source))?;
     let labels = groups.labels(surface.owners(), source.labels, &mut notes)?;
     let sizes = views.sizes(&mut notes)?;
-    surface.finish(labels, sizes, notes)
+    let fields = kept.map(|kept| kept.finish(surface.elements(), &mut notes)).unwrap_or_default();
+    surface.finish(labels, sizes, fields, notes)
 }
 
 /// Reads an MSH file with the entities of its triangles, and the nodes in the middle of their sides.
 pub(super) fn read_patches(source: &Source) -> Result<Patches, ReadError> {
-    let Mesh { surface, notes, .. } = mesh(source, Keep::Patches, Views::default())?;
+    let Mesh { surface, notes, .. } = mesh(source, Keep::Patches, Views::default(), None)?;
     surface.finish_patches(notes)
 }
 
@@ -241,11 +247,12 @@ struct Mesh<'n> {
     surface: Surface<'n>,
     groups: Groups,
     views: Views,
+    kept: Option<Kept<'n>>,
     notes: Notes,
 }
 
 /// Reads the triangles of an MSH file.
-fn mesh<'n>(source: &Source<'n>, keep: Keep, views: Views) -> Result<Mesh<'n>, ReadError> {
+fn mesh<'n>(source: &Source<'n>, keep: Keep, views: Views, kept: Option<Kept<'n>>) -> Result<Mesh<'n>, ReadError> {
     let mut words = Words::new(source.bytes, 1);
     let mut begins = words.next().unwrap_or_default();
     while begins == b"$Comments" {
@@ -269,7 +276,9 @@ fn mesh<'n>(source: &Source<'n>, keep: Keep, views: Views) -> Result<Mesh<'n>, R
         return Err(format_error(line, format!("numbers of {} bytes are not read, only of 8", escape(size))).into());
     }
     let name = escape(name);
-    let found = Found { keep, views, ..Found::default() };
+    // Tags of elements are kept only where something asks for them.
+    let keeps_elements = kept.is_some() && memmem::find(source.bytes, b"$ElementData").is_some();
+    let found = Found { keep, views, kept, keeps_elements, ..Found::default() };
     match encoding {
         b"0" => body(Text(words), version, source.limits, found, Notes::new(format!("MSH {name}, ASCII"))),
         b"1" => {
@@ -311,7 +320,10 @@ struct Found<'n> {
     surface: Option<Surface<'n>>,
     groups: Groups,
     views: Views,
+    /// Fields; none where they are not wanted.
+    kept: Option<Kept<'n>>,
     keep: Keep,
+    keeps_elements: bool,
 }
 
 /// Reads all sections, from the end of the format on.
@@ -333,7 +345,7 @@ fn body<'a, 'n, V: Values<'a>>(
         }
     }
     match found.surface {
-        Some(surface) => Ok(Mesh { surface, groups: found.groups, views: found.views, notes }),
+        Some(surface) => Ok(Mesh { surface, groups: found.groups, views: found.views, kept: found.kept, notes }),
         None => {
             let section = if found.nodes.is_some() { "Elements" } else { "Nodes" };
             Err(MshError::NoSection { section, late: false }.into())
@@ -373,12 +385,13 @@ impl<'n> Found<'n> {
             (b"Elements", _) if self.surface.is_some() => return Err(second(name, values)),
             (b"Elements", _) => {
                 let nodes = self.nodes.take().ok_or(MshError::NoSection { section: "Nodes", late: true })?;
-                let surface = self.surface.insert(Surface::new(nodes, limits, self.keep));
+                let surface = self.surface.insert(Surface::new(nodes, limits, self.keep, self.keeps_elements));
                 match version {
                     Version::Two => sections::elements_2(values, surface)?,
                     Version::FourZero => sections::elements_4_0(values, surface)?,
                     Version::Four => sections::elements_4_1(values, surface)?,
                 }
+                surface.sort_elements();
             }
             (b"PhysicalNames", _) => {
                 let section = values.until_end(name).ok_or(SectionError::End)?;
@@ -390,14 +403,29 @@ impl<'n> Found<'n> {
                 self.groups.entities(section, version);
                 return Ok(());
             }
-            (b"NodeData", _) if self.views.are_wanted() => {
+            (b"NodeData", _) if self.views.are_wanted() || self.kept.is_some() => {
                 let section = values.section(name).ok_or(SectionError::End)?;
                 let nodes = self.surface.as_ref().map(|surface| &surface.nodes).or(self.nodes.as_ref());
-                self.views.read(section, nodes)?;
+                if let Some(kept) = &mut self.kept {
+                    kept.nodes(section.clone(), nodes)?;
+                }
+                if self.views.are_wanted() {
+                    self.views.read(section, nodes)?;
+                }
+                return Ok(());
+            }
+            (b"ElementData", _) if self.kept.is_some() => {
+                let section = values.section(name).ok_or(SectionError::End)?;
+                if let Some(kept) = &mut self.kept {
+                    kept.elements(section, self.surface.as_ref().and_then(Surface::elements))?;
+                }
                 return Ok(());
             }
             _ => {
                 values.until_end(name).ok_or(SectionError::End)?;
+                if let (b"ElementNodeData", Some(kept)) = (name, &mut self.kept) {
+                    kept.pass_over();
+                }
                 return Ok(());
             }
         }

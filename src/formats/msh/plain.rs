@@ -75,10 +75,11 @@ impl Surface<'_> {
             let tag = |at: u64| if at <= tags { int(record, at as usize, big) } else { 0 };
             self.owner = Owner { group: tag(1).saturating_abs(), entity: tag(2) };
         }
+        let element = record.first_chunk::<N>().map_or(0, |tag| number(*tag, big));
         let (corners, others) = nodes.split_at(C);
         others.iter().for_each(|mid| self.mark(*mid));
         if let Some(corners) = corners.first_chunk::<C>() {
-            self.face(corners);
+            self.face(element, corners);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The triangles of an MSH file, as its elements come.
 
+pub use super::elements::Elements;
 use super::groups::{Owner, Owners};
 use super::nodes::Nodes;
 use super::shapes::{Kind, Shape};
@@ -9,7 +10,7 @@ use crate::formats::finish;
 use crate::formats::labels::Labels;
 use crate::formats::location::Location;
 use crate::formats::point_sizes::{self, PointSizes};
-use crate::formats::{Content, Limits, Notes, Patches, ReadError, TooMany, polygon};
+use crate::formats::{Content, Fields, Limits, Notes, Patches, ReadError, TooMany, polygon};
 use crate::settings::LabelSource;
 use std::collections::BTreeMap;
 
@@ -31,6 +32,8 @@ pub struct Surface<'n> {
     pub(super) owner: Owner,
     /// Those of all triangles, where they are asked for.
     owners: Option<Owners>,
+    /// The elements of all triangles, where they are asked for.
+    elements: Option<Elements>,
     pub limits: &'n Limits,
 }
 
@@ -61,11 +64,12 @@ struct Kept {
 
 impl<'n> Surface<'n> {
     /// No triangles. Of those to come, so much is kept.
-    pub(super) fn new(nodes: Nodes, limits: &'n Limits, keep: Keep) -> Self {
+    pub(super) fn new(nodes: Nodes, limits: &'n Limits, keep: Keep, keeps_elements: bool) -> Self {
         let (mids, triangles, skipped, at_hand) = (Vec::new(), Vec::new(), BTreeMap::new(), Vec::new());
         let kept = (keep == Keep::Patches).then(Kept::default);
         let (owner, owners) = (Owner::default(), (keep == Keep::Owners).then(Owners::default));
-        Self { nodes, mids, triangles, skipped, polygons: [0; 2], at_hand, kept, owner, owners, limits }
+        let elements = keeps_elements.then(Elements::default);
+        Self { nodes, mids, triangles, skipped, polygons: [0; 2], at_hand, kept, owner, owners, elements, limits }
     }
 
     /// Whether elements must be looked at one by one.
@@ -77,6 +81,21 @@ impl<'n> Surface<'n> {
     pub fn skip(&mut self, kind: &'static str, count: u64) {
         let skipped = self.skipped.entry(kind).or_insert(0);
         *skipped = skipped.saturating_add(count);
+        if let Some(elements) = &mut self.elements {
+            elements.skip(count);
+        }
+    }
+
+    /// No more elements come: those that are asked for can be found.
+    pub fn sort_elements(&mut self) {
+        if let Some(elements) = &mut self.elements {
+            elements.sort();
+        }
+    }
+
+    /// The elements of the triangles, where they are asked for.
+    pub fn elements(&self) -> Option<&Elements> {
+        self.elements.as_ref()
     }
 
     /// Reads the nodes of an element, by what reads a number.
@@ -112,7 +131,7 @@ impl<'n> Surface<'n> {
                 }
             }
         }
-        self.face(&corners[..count]);
+        self.face(element, &corners[..count]);
         if let Some(kept) = &mut self.kept {
             let is_quadratic = shape.kind == Kind::Triangle && shape.nodes == 6;
             kept.mids.resize(self.triangles.len(), is_quadratic.then_some(mids));
@@ -129,14 +148,17 @@ impl<'n> Surface<'n> {
         self.mids[node as usize] = true;
     }
 
-    /// Adds a face with these corners.
+    /// Adds a face with these corners, that is the element of this tag.
     #[inline]
-    pub(super) fn face(&mut self, corners: &[u32]) {
+    pub(super) fn face(&mut self, element: u64, corners: &[u32]) {
         let is_doubtful = polygon::add(corners, &self.nodes.points, &mut self.triangles);
         self.polygons[0] += usize::from(corners.len() > 3);
         self.polygons[1] += usize::from(is_doubtful);
         if let Some(owners) = &mut self.owners {
             owners.add(self.owner, self.triangles.len());
+        }
+        if let Some(elements) = &mut self.elements {
+            elements.add(element, self.triangles.len());
         }
     }
 
@@ -160,8 +182,15 @@ impl<'n> Surface<'n> {
         Ok(Patches::new(&soup, mids, Some(entities)))
     }
 
-    /// All triangles, and the nodes without those that lie in the middle of edges and faces only, with their sizes.
-    pub fn finish(self, labels: Labels, mut sizes: Option<PointSizes>, mut notes: Notes) -> Result<Content, ReadError> {
+    /// All triangles, and the nodes without those that lie in the middle of edges and faces only, with their sizes and
+    /// fields.
+    pub fn finish(
+        self,
+        labels: Labels,
+        mut sizes: Option<PointSizes>,
+        mut fields: Fields,
+        mut notes: Notes,
+    ) -> Result<Content, ReadError> {
         let Self { nodes, mut mids, mut triangles, .. } = self;
         for (kind, count) in self.skipped {
             notes.skip(kind, usize::try_from(count).unwrap_or(usize::MAX));
@@ -179,6 +208,10 @@ impl<'n> Surface<'n> {
             if let Some(sizes) = &mut sizes {
                 without(&mids, &mut sizes.values);
             }
+            for field in &mut fields.points {
+                let corners = (0..mids.len()).filter(|node| !mids[*node]);
+                field.values = field.values.entries(field.components, corners);
+            }
             for triangle in &mut triangles {
                 *triangle = triangle.map(|node| numbers[node as usize]);
             }
@@ -187,6 +220,7 @@ impl<'n> Surface<'n> {
                 *node = numbers[*node] as usize;
             }
         }
-        Ok(point_sizes::give(finish::content(points, triangles, labels, notes, &bad)?, sizes))
+        let content = point_sizes::give(finish::content(points, triangles, labels, notes, &bad)?, sizes);
+        Ok(Content { fields, ..content })
     }
 }

@@ -547,5 +547,6 @@ fn mutated_files_do_no_harm() {
     assert!(accepted > 5_000, "{accepted}");
 }
 
+mod fields;
 mod groups;
 mod views;

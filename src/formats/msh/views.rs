@@ -39,11 +39,12 @@ struct View {
 }
 
 /// How a section begins.
-struct Head {
-    name: String,
-    step: i64,
-    components: u64,
-    nodes: u64,
+pub(super) struct Head {
+    pub name: String,
+    pub step: i64,
+    pub components: u64,
+    /// How many nodes or elements have values.
+    pub entries: u64,
 }
 
 impl Views {
@@ -65,7 +66,7 @@ impl Views {
         let head = match head(&mut values) {
             Ok(head) => head,
             Err(fault) => {
-                self.damaged.get_or_insert(place(fault, &values));
+                self.damaged.get_or_insert(place(fault, SECTION, &values));
                 return Ok(());
             }
         };
@@ -75,7 +76,7 @@ impl Views {
         if self.asked.as_ref() != Some(&head.name) {
             return Ok(());
         }
-        self.view(&head, &mut values, nodes).map_err(|fault| place(fault, &values))
+        self.view(&head, &mut values, nodes).map_err(|fault| place(fault, SECTION, &values))
     }
 
     /// Reads the values of a section of the view that is asked for.
@@ -97,7 +98,11 @@ impl Views {
             return Ok(());
         }
         // What has several components is refused at the end.
-        if view.components == 1 && head.components == 1 { node_values(head.nodes, values, nodes, view) } else { Ok(()) }
+        if view.components == 1 && head.components == 1 {
+            node_values(head.entries, values, nodes, view)
+        } else {
+            Ok(())
+        }
     }
 
     /// The sizes by the view that is asked for.
@@ -119,12 +124,13 @@ impl Views {
 }
 
 /// What is wrong in a section, with its place. Nothing follows in what was given.
-fn place<'a>(fault: SectionError, values: &impl Values<'a>) -> MshError {
+pub(super) fn place<'a>(fault: SectionError, section: &str, values: &impl Values<'a>) -> MshError {
     let fault = if fault == SectionError::End { SectionError::Short } else { fault };
-    told(fault, SECTION.to_owned(), values.location())
+    told(fault, section.to_owned(), values.location())
 }
 
-fn head<'a>(values: &mut impl Values<'a>) -> Result<Head, SectionError> {
+/// How a section begins, which is read.
+pub(super) fn head<'a>(values: &mut impl Values<'a>) -> Result<Head, SectionError> {
     let strings: u64 = number(values.word())?;
     let mut name = None;
     for _ in 0..strings {
@@ -139,12 +145,12 @@ fn head<'a>(values: &mut impl Values<'a>) -> Result<Head, SectionError> {
     if integers < 3 {
         return Err(SectionError::Value(format!("{integers} whole numbers do not tell components and nodes")));
     }
-    let (step, components, nodes) = (number(values.word())?, number(values.word())?, number(values.word())?);
+    let (step, components, entries) = (number(values.word())?, number(values.word())?, number(values.word())?);
     for _ in 3..integers {
         values.word().ok_or(SectionError::Short)?;
     }
     values.end_line();
-    Ok(Head { name: name.unwrap_or_default(), step, components, nodes })
+    Ok(Head { name: name.unwrap_or_default(), step, components, entries })
 }
 
 /// The values of so many nodes, each behind its tag.
@@ -160,10 +166,15 @@ fn node_values<'a, V: Values<'a>>(
         let no_node = || SectionError::Value(format!("node {tag} has a value, and there is none of this tag"));
         view.values[nodes.find(tag).ok_or_else(no_node)? as usize] = value;
     }
+    expect_end(values, SECTION)
+}
+
+/// Checks that nothing follows in a section.
+pub(super) fn expect_end<'a>(values: &mut impl Values<'a>, section: &str) -> Result<(), SectionError> {
     match values.word() {
         None => Ok(()),
         Some(word) => {
-            let (section, found) = (SECTION.to_owned(), escape(word));
+            let (section, found) = (section.to_owned(), escape(word));
             Err(MshError::NoEnd { section, found, location: values.location() }.into())
         }
     }

@@ -51,14 +51,17 @@ impl Array {
         Self::new(name, 1, "Int32", &bytes)
     }
 
+    /// Whole numbers of any size.
+    pub fn whole(name: &str, components: usize, values: impl Iterator<Item = i64>) -> Self {
+        let bytes: Vec<u8> = values.flat_map(i64::to_le_bytes).collect();
+        Self::new(name, components, "Int64", &bytes)
+    }
+
     /// Numbers of points or of their places, up to `most`.
     fn ids(name: &str, most: u64, values: impl Iterator<Item = u64>) -> Self {
         match i32::try_from(most) {
             Ok(_) => Self::integers(name, values.map(|v| v as i32)),
-            Err(_) => {
-                let bytes: Vec<u8> = values.flat_map(u64::to_le_bytes).collect();
-                Self::new(name, 1, "Int64", &bytes)
-            }
+            Err(_) => Self::whole(name, 1, values.map(|v| v as i64)),
         }
     }
 

@@ -1,7 +1,7 @@
-//! What follows the geometry in a legacy file: `POINT_DATA` and `CELL_DATA`, of which one array of cells labels triangles, and one
-//! of points tells sizes, if it is asked for.
+//! What follows the geometry in a legacy file: `POINT_DATA` and `CELL_DATA`, of which one array of cells labels triangles, one
+//! of points tells sizes, if it is asked for, and all that hold numbers are fields.
 //!
-//! All arrays are passed over first, and those are chosen by their names; no other is looked into.
+//! All arrays are passed over first: what is wrong behind them matters to those only that stand there.
 
 use super::cell_labels::{self, Candidate, CellLabels, PieceCells, Values};
 use super::error::{VtkError, escape};
@@ -19,9 +19,9 @@ type Named<'a> = Vec<(String, Stored<'a>)>;
 /// The arrays behind the geometry of a file, up to its end, or to what cannot be read.
 #[derive(Default)]
 pub(super) struct Attributes<'a> {
-    /// Those of cells that could be labels.
-    of_cells: Named<'a>,
-    /// Those of points that are numbers, of any number of components.
+    /// Those of cells.
+    pub of_cells: Named<'a>,
+    /// Those of points.
     pub of_points: Named<'a>,
     /// Why what follows cannot be read.
     pub broken: Option<VtkError>,
@@ -60,8 +60,8 @@ impl<'a> Attributes<'a> {
         source: &LabelSource,
         notes: &mut Notes,
     ) -> Result<Labels, ReadError> {
-        let arrays = &self.of_cells;
-        let candidates = arrays.iter().map(|(name, array)| Candidate { name, is_float: is_float(array.kind) });
+        let arrays = || self.of_cells.iter().filter(|(_, array)| is_label(array));
+        let candidates = arrays().map(|(name, array)| Candidate { name, is_float: is_float(array.kind) });
         let chosen = cell_labels::chosen(candidates, source);
         // What stands before the damage can be relied on.
         let chosen = match (&self.broken, chosen) {
@@ -72,7 +72,7 @@ impl<'a> Attributes<'a> {
                 chosen.unwrap_or_default()
             }
         };
-        let Some((name, array)) = arrays.iter().find(|(name, _)| Some(name.as_str()) == chosen) else {
+        let Some((name, array)) = arrays().find(|(name, _)| Some(name.as_str()) == chosen) else {
             return Ok(Labels::new(source));
         };
         let mut labels = CellLabels::new(source, name, HashMap::new());
@@ -81,16 +81,22 @@ impl<'a> Attributes<'a> {
         Ok(labels.finish())
     }
 
-    /// Keeps an array that could be asked for.
+    /// Those of points that could tell sizes: numbers, of any number of components.
+    pub fn sizes(&self) -> impl Iterator<Item = &(String, Stored<'a>)> {
+        self.of_points.iter().filter(|(_, array)| matches!(array.kind, Kind::Number(_)) && !array.is_colour)
+    }
+
+    /// Keeps an array of points or cells.
     fn keep(&mut self, of: Option<Owner>, array: Stored<'a>) {
         let Some(of) = of else { return };
-        let is_label = array.components == 1 && array.kind != Kind::Variant;
-        if of.is_cells && is_label {
-            self.of_cells.push((decoded(array.name), array));
-        } else if !of.is_cells && matches!(array.kind, Kind::Number(_)) {
-            self.of_points.push((decoded(array.name), array));
-        }
+        let arrays = if of.is_cells { &mut self.of_cells } else { &mut self.of_points };
+        arrays.push((decoded(array.name), array));
     }
+}
+
+/// Whether an array of cells could label them.
+fn is_label(array: &Stored) -> bool {
+    array.components == 1 && array.kind != Kind::Variant && !array.is_colour
 }
 
 fn is_float(kind: Kind) -> bool {
@@ -188,7 +194,8 @@ impl<'a> Scan<'_, 'a> {
 
     /// Passes over the values of an array.
     fn values(&mut self, name: &'a [u8], kind: Kind, components: u64) -> Result<(), VtkError> {
-        let array = Stored { name, kind, components, tuples: self.tuples()?, at: self.file.text.at };
+        let (tuples, at) = (self.tuples()?, self.file.text.at);
+        let array = Stored { name, kind, components, tuples, at, is_colour: false };
         self.file.skip(&array, "POINT_DATA and CELL_DATA")?;
         self.found.keep(self.of, array);
         Ok(())
@@ -199,10 +206,15 @@ impl<'a> Scan<'_, 'a> {
         let name = self.word()?;
         let number = self.file.count("colours")?;
         self.file.end_of_line();
-        let tuples = if of_table > 1 { of_table } else { self.tuples()? };
+        let is_table = of_table > 1;
+        let tuples = if is_table { of_table } else { self.tuples()? };
         let kind = Kind::Number(Scalar::U8);
-        let array = Stored { name, kind, components: number, tuples, at: self.file.text.at };
-        self.file.skip(&array, "colours")
+        let array = Stored { name, kind, components: number, tuples, at: self.file.text.at, is_colour: true };
+        self.file.skip(&array, "colours")?;
+        if !is_table {
+            self.found.keep(self.of, array);
+        }
+        Ok(())
     }
 }
 
@@ -240,7 +252,7 @@ fn values(
 }
 
 /// The highest bit of a byte is its first.
-fn bit(bytes: &[u8], at: usize) -> i128 {
+pub(super) fn bit(bytes: &[u8], at: usize) -> i128 {
     i128::from(bytes[at / 8] >> (7 - at % 8) & 1)
 }
 

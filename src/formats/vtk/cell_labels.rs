@@ -44,9 +44,18 @@ impl PieceCells {
         self.sections.push(SectionCells { rank, cells: ends.len(), begin, ends });
     }
 
-    /// How many cells there are.
+    /// How many cells there are. (Those that give no triangles are as many as the file says.)
     pub fn count(&self) -> u64 {
-        self.sections.iter().map(|section| section.cells as u64).sum()
+        self.sections.iter().fold(0, |count, section| count.saturating_add(section.cells as u64))
+    }
+
+    /// Per triangle that they give, the number of its cell.
+    pub fn of_triangles(&self) -> impl Iterator<Item = usize> {
+        self.numbered().flat_map(|(section, first)| {
+            let begins = std::iter::once(section.begin).chain(section.ends.iter().map(|end| *end as usize));
+            let cells = begins.zip(&section.ends).zip(first..);
+            cells.flat_map(|((begin, end), cell)| std::iter::repeat_n(cell, *end as usize - begin))
+        })
     }
 
     /// Each section, in the order of the file, and the number of its first cell.
@@ -54,10 +63,10 @@ impl PieceCells {
         let mut order: Vec<usize> = (0..self.sections.len()).collect();
         order.sort_by_key(|section| self.sections[*section].rank);
         let mut first = vec![0; order.len()];
-        let mut cells = 0;
+        let mut cells: usize = 0;
         for section in order {
             first[section] = cells;
-            cells += self.sections[section].cells;
+            cells = cells.saturating_add(self.sections[section].cells);
         }
         self.sections.iter().zip(first)
     }

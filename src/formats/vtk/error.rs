@@ -1,5 +1,6 @@
 //! Why bytes are no VTK file.
 
+use crate::formats::TooMany;
 pub(super) use crate::formats::location::{Location, escape};
 use crate::outcome::Code;
 
@@ -52,6 +53,9 @@ pub enum VtkError {
         /// How many are allowed.
         limit: u64,
     },
+    /// More values than the limit.
+    #[error(transparent)]
+    TooMany(#[from] TooMany),
     /// Something that VTK would not write.
     #[error("{location}: {problem}; correct it or save the file again")]
     Syntax {
@@ -154,7 +158,9 @@ impl VtkError {
         match self {
             Self::Dataset { .. } => Code::UnsupportedFormat,
             Self::Count { .. } | Self::Packed { problem: PackedError::Short { .. }, .. } => Code::CountMismatch,
-            Self::TooLarge { .. } | Self::Packed { problem: PackedError::Expansion { .. }, .. } => Code::TooLarge,
+            Self::TooMany(_) | Self::TooLarge { .. } | Self::Packed { problem: PackedError::Expansion { .. }, .. } => {
+                Code::TooLarge
+            }
             _ => Code::Malformed,
         }
     }
@@ -162,6 +168,7 @@ impl VtkError {
     pub(in crate::formats) fn location(&self) -> Option<String> {
         match self {
             Self::NoVtk { .. } => Some("byte 0".to_owned()),
+            Self::TooMany(_) => None,
             Self::Dataset { location, .. }
             | Self::Count { location, .. }
             | Self::TooLarge { location, .. }

@@ -1,17 +1,18 @@
 //! VTK legacy files, 2.0 to 5.1: `# vtk DataFile Version`, a title, `ASCII` or `BINARY`, and a data set.
 //!
-//! The geometry is read, and of what follows it (`POINT_DATA`, `CELL_DATA`) the one array that
-//! labels cells, and the one of points that tells sizes. What stands
-//! before or in between (`FIELD`, `METADATA`) is passed over.
+//! The geometry is read, and what follows it (`POINT_DATA`, `CELL_DATA`): the one array that labels cells, the one of points that
+//! tells sizes, and all fields. What stands before or in between (`FIELD`, `METADATA`) is passed over.
 
 use super::attributes::Attributes;
 use super::cell;
 use super::cell_labels::Rank;
 use super::error::{VtkError, escape};
 use super::legacy_arrays::Arrays;
+use super::legacy_fields;
 use super::legacy_sizes;
 use super::surface::{Cells, Surface, Types};
 use super::unsupported;
+use crate::formats::fields::Keeping;
 use crate::formats::labels::Labels;
 use crate::formats::point_sizes;
 use crate::formats::{Content, LabelSource, ReadError, Source};
@@ -23,7 +24,8 @@ pub(super) const HEAD: &[u8] = b"# vtk DataFile Version";
 pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let mut file = Arrays::new(source.bytes);
     let format = header(&mut file)?;
-    let mut surface = Surface::new(source.limits, format, *source.labels != LabelSource::Ignored);
+    let is_labelled = *source.labels != LabelSource::Ignored;
+    let mut surface = Surface::new(source.limits, format, is_labelled || source.keeps_fields);
     let location = file.location();
     match file.keyword().as_deref() {
         Some(b"POLYDATA") => polydata(&mut file, &mut surface)?,
@@ -31,17 +33,23 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
         Some(other) => return Err(unsupported(location, &escape(other)).into()),
         None => return Err(file.ends("the kind of the data set").into()),
     }
-    let cells = surface.take_cells();
-    let is_asked = cells.is_some() || source.sizes.is_some();
+    let cells = surface.take_cells().unwrap_or_default();
+    let is_asked = is_labelled || source.keeps_fields || source.sizes.is_some();
     let attributes = if is_asked { Attributes::of(&mut file) } else { Attributes::default() };
-    let labels = match cells {
-        Some(cells) => attributes.labels(&mut file, &cells, source.labels, surface.notes())?,
-        None => Labels::new(source.labels),
+    let labels = match is_labelled {
+        true => attributes.labels(&mut file, &cells, source.labels, surface.notes())?,
+        false => Labels::new(source.labels),
     };
     let points = surface.points();
     let content = surface.finish(labels)?;
     let sizes = source.sizes.map(|asked| legacy_sizes::sizes(&mut file, &attributes, asked, points)).transpose()?;
-    Ok(point_sizes::give(content, sizes))
+    let mut content = point_sizes::give(content, sizes);
+    if source.keeps_fields {
+        let mut keeping = Keeping::new(source.limits, source.bytes.len());
+        legacy_fields::keep(&mut file, &attributes, points, &cells, &mut keeping).map_err(VtkError::from)?;
+        content.fields = keeping.finish(&mut content.notes);
+    }
+    Ok(content)
 }
 
 /// The first lines, up to `DATASET`; the version and encoding.

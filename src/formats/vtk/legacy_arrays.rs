@@ -223,7 +223,7 @@ impl<'a> Arrays<'a> {
             }
             let (components, tuples) = (self.count("components")?, self.count("tuples")?);
             let kind = self.kind("an array of FIELD")?;
-            let array = Stored { name, kind, components, tuples, at: self.text.at };
+            let array = Stored { name, kind, components, tuples, at: self.text.at, is_colour: false };
             self.skip(&array, "FIELD")?;
             tell(array);
         }
@@ -286,6 +286,8 @@ pub(super) struct Stored<'a> {
     pub tuples: u64,
     /// Behind the type.
     pub at: usize,
+    /// Whether it holds colours: in text these are parts of one, whatever their type.
+    pub is_colour: bool,
 }
 
 /// The layout before version 5: the number of corners of each cell before them.

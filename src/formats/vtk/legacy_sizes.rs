@@ -18,8 +18,7 @@ pub(super) fn sizes(
     asked: &str,
     points: u64,
 ) -> Result<PointSizes, ReadError> {
-    let mut arrays = attributes.of_points.iter();
-    let Some((_, array)) = arrays.find(|(name, _)| name == asked) else {
+    let Some((_, array)) = attributes.sizes().find(|(name, _)| name == asked) else {
         // It may stand behind the damage.
         let broken = attributes.broken.clone().map(ReadError::from);
         return Err(broken.unwrap_or_else(|| missing(attributes, asked).into()));
@@ -30,7 +29,7 @@ pub(super) fn sizes(
 
 /// The refusal of an array that is not there.
 fn missing(attributes: &Attributes, asked: &str) -> SizeError {
-    let usable = attributes.of_points.iter().filter(|(_, array)| array.components == 1);
+    let usable = attributes.sizes().filter(|(_, array)| array.components == 1);
     SizeError::missing(usable.map(|(name, _)| name.as_str()), asked)
 }
 

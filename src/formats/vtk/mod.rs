@@ -8,11 +8,14 @@
 
 mod appended;
 mod attributes;
+mod carried;
 mod cell;
+mod cell_fields;
 mod cell_labels;
 mod error;
 mod legacy;
 mod legacy_arrays;
+mod legacy_fields;
 mod legacy_sizes;
 mod made;
 mod packed;
@@ -25,6 +28,7 @@ pub mod vtp;
 pub mod vtu;
 pub mod welded;
 mod xml;
+mod xml_fields;
 mod xml_labels;
 mod xml_outline;
 mod xml_parts;

@@ -1,11 +1,12 @@
 //! surface.vtu and param.vtu: written for ParaView, and read again by `planish check`.
 
 use super::appended::{self, Array};
+use super::carried::Carried;
 use super::error::VtkError;
 pub use super::read_back::{read, read_labels, read_shape};
 use super::vtm::escape;
 use crate::formats::layout::layout;
-use crate::formats::{Label, label_index};
+use crate::formats::{Fields, Label, label_index};
 use planish_core::atlas::Chart;
 use planish_core::measure::distortion::CellFields;
 use planish_core::topology::{ChartId, EdgeId, VertexId};
@@ -57,17 +58,18 @@ pub struct Shape {
     pub chart: Vec<i32>,
 }
 
-/// The bytes of surface.vtu. Cells have their label's tag, where there are labels, and the names of these are told beside.
-pub fn surface(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<u8> {
+/// The bytes of surface.vtu. Cells have their label's tag, where there are labels, and the names of these are told beside. The
+/// `fields` of the input, with an entry for each vertex after welding, stand behind planish's own.
+pub fn surface(atlas: &CertifiedAtlas, labels: &[Label], fields: &Fields) -> Vec<u8> {
     let charts: Vec<_> = atlas.charts().iter().collect();
-    encode(atlas, &charts, labels, |certified, node, _| position(certified.chart(), node))
+    encode(atlas, &charts, labels, fields, |certified, node, _| position(certified.chart(), node))
 }
 
 /// The same of one label alone, counted from 0.
-pub fn part(atlas: &CertifiedAtlas, labels: &[Label], label: usize) -> Vec<u8> {
+pub fn part(atlas: &CertifiedAtlas, labels: &[Label], label: usize, fields: &Fields) -> Vec<u8> {
     let is_part = |c: &&CertifiedChart| label_index(atlas, c.id(), labels) == Some(label);
     let charts: Vec<_> = atlas.charts().iter().filter(is_part).collect();
-    encode(atlas, &charts, labels, |certified, node, _| position(certified.chart(), node))
+    encode(atlas, &charts, labels, fields, |certified, node, _| position(certified.chart(), node))
 }
 
 /// The bytes of param.vtu: the same cells in the parametric plane, charts beside each other, each in its own size (see
@@ -75,7 +77,7 @@ pub fn part(atlas: &CertifiedAtlas, labels: &[Label], label: usize) -> Vec<u8> {
 pub fn param(atlas: &CertifiedAtlas, labels: &[Label]) -> Vec<u8> {
     let places = layout(atlas.charts());
     let charts: Vec<_> = atlas.charts().iter().collect();
-    encode(atlas, &charts, labels, |certified, _, uv| places[certified.id().index()].of(uv))
+    encode(atlas, &charts, labels, &Fields::default(), |certified, _, uv| places[certified.id().index()].of(uv))
 }
 
 /// The position of a node in space: that of a vertex, or the middle of a straight edge.
@@ -94,6 +96,7 @@ fn encode(
     atlas: &CertifiedAtlas,
     charts: &[&CertifiedChart],
     labels: &[Label],
+    fields: &Fields,
     place: impl Fn(&CertifiedChart, usize, [f64; 2]) -> [f64; 3],
 ) -> Vec<u8> {
     let mut cells: Vec<u32> = Vec::with_capacity(6 * charts.iter().map(|c| c.fields().len()).sum::<usize>());
@@ -108,13 +111,17 @@ fn encode(
         let nodes = certified.map().map().nodes.iter().enumerate();
         nodes.flat_map(move |(node, p)| place(certified, node, p.uv()))
     });
+    let carried = Carried::new(fields, atlas.mesh());
+    let (mut of_points, mut of_cells) = (point_fields(charts), cell_fields(atlas, charts, labels));
+    of_points.extend(carried.of_points(charts));
+    of_cells.extend(carried.of_cells(charts));
     let grid = appended::Grid {
         count,
         points: Array::doubles("Points", 3, places),
         cells,
         nodes_per_cell: 6,
-        of_points: point_fields(charts),
-        of_cells: cell_fields(atlas, charts, labels),
+        of_points,
+        of_cells,
         field_data: names_of_labels(labels),
     };
     grid.into_bytes()

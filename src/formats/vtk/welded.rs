@@ -125,7 +125,7 @@ mod tests {
             assert_eq!(points[*middle as usize], midpoint(points[*a as usize], points[*b as usize]));
         }
         // Cell by cell the triangles of surface.vtu, node by node.
-        let open = read_shape(&crate::formats::vtu::surface(&atlas, &[])).expect("read");
+        let open = read_shape(&crate::formats::vtu::surface(&atlas, &[], &Default::default())).expect("read");
         assert_eq!(cells.len(), open.cells.len());
         for (cell, apart) in cells.iter().zip(&open.cells) {
             assert!((0..6).all(|k| points[cell[k] as usize] == open.points[apart[k] as usize]));

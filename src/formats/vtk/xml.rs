@@ -6,10 +6,12 @@ use super::packed::{Budget, Compressor, Packing, Stream, unpack};
 use super::scalar::Order;
 use super::surface::{Cells, Surface, Types};
 use super::text::Text;
+use super::xml_fields;
 use super::xml_labels;
 use super::xml_outline::outline;
 use super::xml_parts::{Appended, Array, Data, Outline, Piece, Role, Section, Wanted};
 use super::xml_sizes;
+use crate::formats::fields::Keeping;
 use crate::formats::labels::Labels;
 use crate::formats::point_sizes;
 use crate::formats::{Content, LabelSource, ReadError, Source};
@@ -21,9 +23,11 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     let readable = readable(source.bytes);
     let source = &Source { bytes: &readable, ..*source };
     let is_labelled = *source.labels != LabelSource::Ignored;
-    let wanted = Wanted::Arrays { of_cells: is_labelled, of_points: source.sizes.is_some() };
+    let keeps = source.keeps_fields;
+    let wanted = Wanted::Arrays { of_cells: is_labelled || keeps, of_points: source.sizes.is_some() || keeps };
     let file = outline(source.bytes, source.limits.depth, wanted)?;
-    let mut surface = Surface::new(source.limits, format(&file), is_labelled);
+    let needs_cells = is_labelled || !file.of_cells.is_empty();
+    let mut surface = Surface::new(source.limits, format(&file), needs_cells);
     let mut arrays = Arrays::new(source, &file);
     let mut cells: Vec<PieceCells> = Vec::new();
     for piece in &file.pieces {
@@ -37,7 +41,14 @@ pub(super) fn read(source: &Source) -> Result<Content, ReadError> {
     };
     let content = surface.finish(labels)?;
     let sizes = source.sizes.map(|asked| xml_sizes::sizes(&mut arrays, &file, asked)).transpose()?;
-    Ok(point_sizes::give(content, sizes))
+    let mut content = point_sizes::give(content, sizes);
+    // Last: nothing else is missing for what they take of the budget.
+    if keeps {
+        let mut keeping = Keeping::new(source.limits, source.bytes.len());
+        xml_fields::keep(&mut arrays, &file, &cells, &mut keeping).map_err(VtkError::from)?;
+        content.fields = keeping.finish(&mut content.notes);
+    }
+    Ok(content)
 }
 
 /// A file that says to be in an encoding of one byte per letter, with another letter for each that is not ASCII: only

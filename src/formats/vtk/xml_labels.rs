@@ -28,7 +28,8 @@ pub(super) fn labels<'a>(
     notes: &mut Notes,
 ) -> Result<Labels, ReadError> {
     let mut met = HashSet::new();
-    let names: Vec<&Named> = file.of_cells.iter().filter(|named| met.insert(named.name.as_str())).collect();
+    let could_be = file.of_cells.iter().filter(|named| named.components() == 1);
+    let names: Vec<&Named> = could_be.filter(|named| met.insert(named.name.as_str())).collect();
     let is_float = |named: &Named| named.array.as_ref().is_ok_and(|array| array.scalar.is_float());
     let candidates = names.iter().map(|named| Candidate { name: &named.name, is_float: is_float(named) });
     let Some(name) = cell_labels::chosen(candidates, source)? else { return Ok(Labels::new(source)) };
@@ -53,7 +54,8 @@ fn of_pieces<'a>(
     for (number, piece) in pieces.iter().enumerate() {
         let (of_piece, others) = rest.split_at(rest.partition_point(|named| named.owner.piece() <= Some(number)));
         rest = others;
-        let values = match of_piece.iter().find(|named| named.name == name) {
+        let is_chosen = |named: &&Named| named.name == name && named.components() == 1;
+        let values = match of_piece.iter().find(is_chosen) {
             Some(named) => Some(values(arrays, named, piece.count(), &mut labels)?),
             None => None,
         };
@@ -128,7 +130,8 @@ fn letters(mut text: Text, name: &str) -> Result<Vec<u8>, VtkError> {
 fn names<'a>(arrays: &mut Arrays<'a>, file: &Outline<'a>) -> Result<HashMap<i64, String>, VtkError> {
     let mut names = HashMap::new();
     let is_whole = |named: &&Named| named.array.as_ref().is_ok_and(|array| !array.scalar.is_float());
-    for named in file.of_file.iter().filter(|named| !named.is_strings).filter(is_whole) {
+    let could_be = file.of_file.iter().filter(|named| !named.is_strings && named.components() == 1);
+    for named in could_be.filter(is_whole) {
         if let [tag, SURFACE] = tags(arrays, named)?[..] {
             names.insert(tag, named.name.clone());
         }

@@ -47,6 +47,8 @@ struct Search<'a> {
     packing: Packing,
     pieces: Vec<Piece<'a>>,
     named: Vec<Named<'a>>,
+    /// Arrays of points or cells that are none of these.
+    passed_over: usize,
     /// Whether there was a piece with nothing in it.
     has_empty: bool,
     appended: Option<Appended<'a>>,
@@ -66,6 +68,7 @@ impl<'a> Search<'a> {
             packing: Packing { order: Order::Little, wide: false, compressor: None },
             pieces: Vec::new(),
             named: Vec::new(),
+            passed_over: 0,
             has_empty: false,
             appended: None,
         }
@@ -235,7 +238,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// An array that could label cells, name labels, or tell sizes. What is wrong with it matters where it is chosen only.
+    /// An array of cells or points, or one that could name labels. What is wrong with it matters where it is chosen only.
     fn named(&mut self, tag: &BytesStart, parent: Tag) -> Tag {
         let Some(owner) = self.owner(parent) else { return Tag::Other };
         let is_of_points = matches!(owner, Owner::Points(_));
@@ -244,13 +247,11 @@ impl<'a> Search<'a> {
         let kind = attribute(tag, "type").unwrap_or_default();
         let is_strings = kind == "String";
         let scalar = if is_strings { Some(Scalar::U8) } else { Scalar::xml(kind) };
-        let Some(scalar) = scalar.filter(|_| !(is_strings && is_of_points)) else { return Tag::Other };
-        let array = self.stored(tag, scalar, &Role::values_of(&name));
-        let has_several = array.as_ref().is_ok_and(|array| array.components.is_some_and(|components| components > 1));
-        // Which array tells sizes is asked for by name: one of several components is told to be one.
-        if has_several && !is_of_points {
+        let Some(scalar) = scalar.filter(|_| !(is_strings && is_of_points)) else {
+            self.passed_over += usize::from(owner != Owner::File);
             return Tag::Other;
-        }
+        };
+        let array = self.stored(tag, scalar, &Role::values_of(&name));
         self.named.push(Named { name, owner, is_strings, array });
         Tag::Named
     }
@@ -322,7 +323,7 @@ impl<'a> Search<'a> {
         if self.pieces.is_empty() && !self.has_empty {
             return Err(self.syntax("there is no <Piece> in the file"));
         }
-        let (packing, pieces, appended) = (self.packing, self.pieces, self.appended);
+        let (packing, pieces, appended, passed_over) = (self.packing, self.pieces, self.appended, self.passed_over);
         let [mut of_cells, mut of_file, mut of_points] = [const { Vec::new() }; 3];
         for named in self.named {
             match named.owner {
@@ -331,7 +332,7 @@ impl<'a> Search<'a> {
                 Owner::Points(_) => of_points.push(named),
             }
         }
-        Ok(Outline { kind, packing, pieces, of_cells, of_file, of_points, appended })
+        Ok(Outline { kind, packing, pieces, of_cells, of_file, of_points, passed_over, appended })
     }
 }
 

@@ -11,12 +11,14 @@ pub(super) struct Outline<'a> {
     pub kind: &'static str,
     pub packing: Packing,
     pub pieces: Vec<Piece<'a>>,
-    /// Arrays of cells that could label them, piece by piece, where they are wanted.
+    /// Arrays of cells, of any number of components, piece by piece, where they are wanted.
     pub of_cells: Vec<Named<'a>>,
     /// Arrays of the whole file that name labels, where they are wanted.
     pub of_file: Vec<Named<'a>>,
     /// Arrays of points, of any number of components, piece by piece, where they are wanted.
     pub of_points: Vec<Named<'a>>,
+    /// How many arrays of points or cells there are beside these: of strings, or of types that are not known.
+    pub passed_over: usize,
     pub appended: Option<Appended<'a>>,
 }
 
@@ -27,9 +29,9 @@ pub(super) enum Wanted {
     Fields(&'static [Field]),
     /// All arrays of these sorts.
     Arrays {
-        /// Of cells, that could be labels, and what names these.
+        /// Of cells, and what names labels.
         of_cells: bool,
-        /// Of points, that could tell sizes.
+        /// Of points.
         of_points: bool,
     },
 }
@@ -65,7 +67,7 @@ impl Owner {
     }
 }
 
-/// An array that could label cells, name labels, or tell sizes at points.
+/// An array of cells or points, or one that names labels.
 pub(super) struct Named<'a> {
     pub name: String,
     pub owner: Owner,
@@ -73,6 +75,13 @@ pub(super) struct Named<'a> {
     pub is_strings: bool,
     /// The array, or what is wrong with it.
     pub array: Result<Array<'a>, VtkError>,
+}
+
+impl Named<'_> {
+    /// How many numbers make an entry; one where that is not told.
+    pub fn components(&self) -> u64 {
+        self.array.as_ref().ok().and_then(|array| array.components).unwrap_or(1).max(1)
+    }
 }
 
 /// Points and cells that belong together.

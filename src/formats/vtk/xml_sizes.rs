@@ -14,7 +14,7 @@ use crate::formats::words::float;
 /// It is not there, or cannot be read.
 pub(super) fn sizes<'a>(arrays: &mut Arrays<'a>, file: &Outline<'a>, asked: &str) -> Result<PointSizes, ReadError> {
     if !file.of_points.iter().any(|named| named.name == asked) {
-        let usable = file.of_points.iter().filter(|named| components(named) == 1);
+        let usable = file.of_points.iter().filter(|named| named.components() == 1);
         return Err(SizeError::missing(usable.map(|named| named.name.as_str()), asked).into());
     }
     let mut all = Vec::new();
@@ -31,14 +31,9 @@ pub(super) fn sizes<'a>(arrays: &mut Arrays<'a>, file: &Outline<'a>, asked: &str
     Ok(PointSizes { array: asked.to_owned(), values: all })
 }
 
-/// How many numbers a point has; one where that is not told.
-fn components(named: &Named) -> u64 {
-    named.array.as_ref().ok().and_then(|array| array.components).unwrap_or(1)
-}
-
 /// The values of an array at so many points.
 fn values<'a>(arrays: &mut Arrays<'a>, named: &Named<'a>, points: u64) -> Result<Vec<f64>, ReadError> {
-    point_sizes::expect_one_component(&named.name, components(named))?;
+    point_sizes::expect_one_component(&named.name, named.components())?;
     Ok(numbers(arrays, named, points)?)
 }
 

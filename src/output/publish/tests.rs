@@ -140,7 +140,7 @@ fn a_result_that_could_not_be_put_in_place_is_put_there_later() {
         let faulty = disk.process(1, Plan { fail: Some((failing, Errno::IO)), ..Plan::default() });
         let Ok(publisher) = Publisher::open_on(faulty.clone(), out) else { continue };
         let Ok(staged) = publisher.room() else { continue };
-        let half = staged.desk.half().and_then(|half| staging::write_all(&half, &files("newer")));
+        let half = staged.desk.half().and_then(|half| listed::write_all(&half, &files("newer")));
         if half.is_err() {
             continue;
         }

@@ -6,7 +6,7 @@ use super::*;
 const NONE: f64 = f64::INFINITY;
 
 fn sized(bytes: &[u8], view: &str) -> Result<Content, ReadError> {
-    read(&Source { sizes: Some(view), ..Source::alone(bytes, &Limits::default()) })
+    read(&Source { sizes: Some(view), keeps_fields: false, ..Source::alone(bytes, &Limits::default()) })
 }
 
 /// A section of a view, with so many values for each node.

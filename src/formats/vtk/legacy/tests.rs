@@ -277,5 +277,6 @@ fn other_files_are_named() {
     assert!(reason.message.contains("begins with \"solid part") && reason.code == Code::Malformed, "{reason:?}");
 }
 
+mod fields;
 mod labels;
 mod sizes;

@@ -226,7 +226,8 @@ impl File {
 
     fn points(self, numbers: &[f32]) -> Self {
         let file = self.text("<PointData Scalars=\"connectivity\">\n");
-        let file = file.array("Float32", "connectivity", "", &[1.0, 2.0], f32::to_be_bytes).text("</PointData>\n");
+        let file =
+            file.array("Float32", "connectivity", "", &[1.0, 2.0, 3.0, 4.0], f32::to_be_bytes).text("</PointData>\n");
         let file = file.text("<Points>\n").array("Float32", "Points", THREE, numbers, f32::to_be_bytes);
         file.text("</Points>\n")
     }

@@ -5,7 +5,10 @@ use super::*;
 use crate::formats::LabelSource;
 
 fn labelled(bytes: &[u8], source: &LabelSource) -> Result<Content, ReadError> {
-    crate::formats::read(Format::Vtu, &Source { labels: source, ..Source::alone(bytes, &Limits::default()) })
+    crate::formats::read(
+        Format::Vtu,
+        &Source { labels: source, keeps_fields: false, ..Source::alone(bytes, &Limits::default()) },
+    )
 }
 
 fn asked(name: &str) -> LabelSource {

@@ -1,5 +1,6 @@
 //! XML files in every encoding, written by a small writer, whole, cut off, and lying.
 
+mod fields;
 mod files;
 mod labels;
 mod sizes;
