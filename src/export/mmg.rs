@@ -14,7 +14,7 @@ use crate::formats::{JoinedVertices, label_index};
 use crate::report::{MmgReport, Reference};
 use crate::result_files;
 use planish_core::CertifiedAtlas;
-use planish_core::decompose::features;
+use planish_core::decompose;
 use planish_core::measure::bends::dihedral_cosines;
 use planish_core::measure::curvature;
 use planish_core::measure::sizes::SizeTable;
@@ -158,7 +158,7 @@ fn ridges(
 ) -> Result<BTreeSet<[u32; 2]>, Interrupted> {
     let mesh = atlas.mesh();
     let mut ridges = BTreeSet::new();
-    for h in features(mesh, angle, monitor)? {
+    for h in decompose::ridges(mesh, angle, monitor)? {
         let corners = mesh.triangles()[h.face().index()];
         ridges.insert(sorted([corners[h.side()], corners[(h.side() + 1) % 3]].map(number)));
     }

@@ -58,7 +58,7 @@ pub(crate) use contacts::touches_itself;
 use contacts::without_contacts;
 use dual::Dual;
 pub use ears::{WithoutEars, split_ears};
-pub use features::features;
+pub use features::ridges;
 use features::{min_outline, with_features};
 use finish::finish;
 pub use legality::Illegal;
