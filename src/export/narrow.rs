@@ -92,6 +92,29 @@ pub(super) fn places(
     Places { sized, ..places }
 }
 
+/// Handles and holes around which fewer edges go than this may close, where a mesher knows of no seams: mmgs made of 88 of cad_imu's
+/// edges with four triangles. A loop of so many is kept.
+const EDGES_AROUND: f64 = 6.0;
+
+/// Places along the loops of charts that are too short for edges of the size.
+pub(super) fn short_loops(mesh: &SurfaceMesh, charts: &[CertifiedChart], network: &SeamNetwork, size: f64) -> Vec<SizedPlace> {
+    let mut wanted = vec![f64::INFINITY; network.curves().len()];
+    for turn in charts.iter().flat_map(|chart| network.loops(chart.chart().id())) {
+        let needed = length_of(turn, network) / EDGES_AROUND;
+        for passage in turn {
+            let known = &mut wanted[passage.curve.index()];
+            *known = known.min(needed);
+        }
+    }
+    let mut places = Vec::new();
+    for (curve, wanted) in network.curves().iter().zip(wanted) {
+        if let Some(halvings) = halvings(size, wanted) {
+            places.extend(along_curve(mesh, curve, halved(size, halvings)));
+        }
+    }
+    places
+}
+
 /// The size, halved so often.
 fn halved(size: f64, halvings: u32) -> f64 {
     size * 0.5_f64.powi(halvings as i32)

@@ -66,7 +66,10 @@ pub(super) fn varying(atlas: &CertifiedAtlas, curvatures: &[Principal], seams: S
     let (mesh, charts, sizes) = (atlas.mesh(), atlas.charts(), &wanted.sizes);
     let Places { sized, curves, gaps } = match seams {
         Seams::Kept { adapted } => narrow::places(mesh, charts, atlas.seams(), adapted, sizes.size),
-        Seams::Passed => Places::default(),
+        Seams::Passed => {
+            let sized = narrow::short_loops(mesh, charts, atlas.seams(), sizes.size);
+            Places { sized, ..Places::default() }
+        }
     };
     let thin = spikes(mesh, charts, curvatures, sizes.size);
     let counts = Varying { narrow_curves: curves, narrow_places: gaps, spikes: thin.len(), ..Varying::default() };
