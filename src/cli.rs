@@ -33,6 +33,8 @@ pub enum Verb {
     Info(Info),
     /// Carry meshes made in the planes of charts, or a table of points there, onto the surface
     Lift(Lift),
+    /// Put the fields of the input on a new mesh of its surface
+    Transfer(Transfer),
     /// Tell what a running daemon does: queue, stages and progress, done, refused
     Status(Status),
     /// Have inputs done again whose result is not certified
@@ -311,6 +313,26 @@ pub struct Lift {
     pub common: Common,
 }
 
+/// `planish transfer`
+#[derive(Debug, Args)]
+pub struct Transfer {
+    /// The mesh, in space, in any format that planish reads
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// The result whose fields these are: its folder, or its report.json
+    #[arg(long, value_name = "DIR")]
+    pub atlas: PathBuf,
+    /// The mesh with fields (.msh, .vtu)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Fields of cells whose sums are to be kept, as charges or counts; others are densities, whose integrals are
+    #[arg(long, value_name = "ARRAY", value_delimiter = ',')]
+    pub extensive: Vec<String>,
+    /// Shared options
+    #[command(flatten)]
+    pub common: Common,
+}
+
 /// `planish info`
 #[derive(Debug, Args)]
 pub struct Info {
@@ -385,6 +407,7 @@ impl Verb {
             Self::Watch(watch) => (&watch.common, watch.said()),
             Self::Check(check) => (&check.common, RawSettings::default()),
             Self::Info(info) => (&info.common, info.reading.said()),
+            Self::Transfer(transfer) => (&transfer.common, RawSettings::default()),
             Self::Lift(lift) => (&lift.common, RawSettings::default()),
             Self::Apart(apart) => (&apart.common, RawSettings { log: Some(Log::Json), ..RawSettings::default() }),
             Self::Retry(retry) => (&retry.common, RawSettings { out: retry.out.clone(), ..RawSettings::default() }),

@@ -31,6 +31,7 @@ fn dispatch(verb: &Verb, settings: &Settings) -> Result<Exit, Box<dyn std::error
         },
         Verb::Info(info) => verbs::info::info(&info.inputs, info.json, settings),
         Verb::Lift(lift) => verbs::lift::lift(lift, settings),
+        Verb::Transfer(transfer) => verbs::transfer::transfer(transfer, settings),
         Verb::Apart(apart) => verbs::job::job(apart, settings),
         Verb::Status(status) => verbs::status::status(status, settings),
         Verb::Retry(retry) => verbs::retry::retry(&retry.names, settings),

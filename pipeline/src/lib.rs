@@ -35,7 +35,8 @@
 //! 5. [`CertifiedAtlas::gather`] puts the charts together, and finds the [curves](seams) between them.
 //! 6. [`mod@subdivide`] makes linear triangulations of an atlas, for meshers that know of charts, [`planar`] meshes of their planes
 //!    for those that do not, whose work is [lifted](mod@lift) back; [`evaluate`] goes from space to the plane and back;
-//!    [`soundness`] tells whether a mesh that was made through them is any good.
+//!    [`soundness`] tells whether a mesh that was made through them is any good, and [`transfer`] which parts of the surface its
+//!    elements stand for.
 //!
 //! # What is promised
 //!
@@ -82,6 +83,7 @@ pub mod shapes;
 pub mod soundness;
 pub mod subdivide;
 pub mod topology;
+pub mod transfer;
 pub mod untangle;
 pub mod vec3;
 

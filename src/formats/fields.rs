@@ -134,6 +134,21 @@ fn entries<T: Copy>(values: &[T], components: usize, numbers: impl Iterator<Item
     numbers.flat_map(|number| &values[components * number..components * (number + 1)]).copied().collect()
 }
 
+impl Field {
+    /// A field that planish makes itself.
+    pub fn new(name: impl Into<String>, components: usize, values: Values) -> Self {
+        Self { name: name.into(), input_name: None, components, values }
+    }
+
+    /// One of its numbers, as a double.
+    pub fn number(&self, at: usize) -> f64 {
+        match &self.values {
+            Values::Integers(values) => values[at] as f64,
+            Values::Floats(values) => values[at],
+        }
+    }
+}
+
 impl Fields {
     /// Whether there are none.
     pub fn are_none(&self) -> bool {

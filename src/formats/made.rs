@@ -1,5 +1,6 @@
 //! A mesh that planish has made on a surface, as encoders get it.
 
+use super::fields::Field;
 use super::labels::Label;
 use planish_core::vec3::Vec3;
 use std::path::Path;
@@ -19,6 +20,10 @@ pub struct MadeMesh {
     pub parts: Vec<Label>,
     /// Per chart, the position of its part among these; none where it has no name.
     pub part_of_chart: Vec<Option<usize>>,
+    /// Arrays with an entry for each node.
+    pub of_points: Vec<Field>,
+    /// Arrays with an entry for each triangle.
+    pub of_cells: Vec<Field>,
 }
 
 impl MadeMesh {

@@ -33,7 +33,7 @@ mod words;
 use crate::outcome::{Code, Reason};
 pub use crate::settings::{LabelSource, Limits};
 pub use content::{Content, NoSiblings, Notes, SiblingFiles, Source, TooMany};
-pub use fields::Fields;
+pub use fields::{Field, Fields, Values};
 pub use gltf::glb;
 pub use joined::JoinedVertices;
 pub use labels::{Label, LabelError, label_index};

@@ -5,7 +5,7 @@ use crate::formats::Label;
 use crate::formats::vtu::{self, Grid};
 use crate::input::read_file_into;
 use crate::outcome::Reason;
-use crate::report::{Output, Report};
+use crate::report::{FieldReport, Output, Report};
 use crate::result_files;
 use crate::system::escape::escape;
 use planish_core::lift::ChartedSurface;
@@ -29,6 +29,8 @@ pub(super) struct AtlasOnDisk {
     pub labels: Vec<Label>,
     /// Per chart, the position of its part among these.
     pub part_of_chart: Vec<Option<usize>>,
+    /// The fields of the input that it holds.
+    pub fields: Vec<FieldReport>,
     /// The bytes of surface.vtu.
     pub bytes: Vec<u8>,
 }
@@ -54,7 +56,7 @@ impl AtlasOnDisk {
         for (chart, tag) in charts.iter().zip(tags.iter().flatten()) {
             part_of_chart[*chart as usize] = labels.iter().position(|label| label.tag == *tag);
         }
-        Ok(Self { surface, grid, labels, part_of_chart, bytes })
+        Ok(Self { surface, grid, labels, part_of_chart, fields: report.fields, bytes })
     }
 }
 

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// Why nothing is lifted.
 #[derive(Debug, thiserror::Error)]
-enum NotLifted {
+pub(super) enum NotLifted {
     #[error(transparent)]
     Atlas(#[from] Unusable),
     #[error(transparent)]
@@ -104,6 +104,7 @@ fn lift_meshes(asked: &cli::Lift, format: MadeFormat, settings: &Settings) -> Re
         charts: lifted.charts,
         parts: atlas.labels,
         part_of_chart: atlas.part_of_chart,
+        ..MadeMesh::default()
     };
     write(&asked.output, &encode_made(format, &mesh))?;
     let off = farthest.map_or(String::new(), |off: f64| format!("; nodes were off the surface by {off:.2e} at most"));
@@ -150,23 +151,28 @@ fn lift_table(asked: &cli::Lift) -> Result<String, NotLifted> {
     let broken = |problem: String| NotLifted::Mesh { mesh: name.clone(), problem };
     let Table { rows } = planar_input::read_table(name).map_err(broken)?;
     let mut text = String::with_capacity(100 * rows.len());
-    text.push_str("x,y,z,triangle,w0,w1,w2,off\n");
+    text.push_str("x,y,z,triangle,off\n");
+    let mut shortest = zmij::Buffer::new();
     for (line, (chart, uv)) in rows.iter().enumerate() {
         let Some(found) = atlas.surface.locate(*chart, *uv) else {
             let charts = atlas.surface.charts();
             return Err(broken(format!("row {}: there is no chart {chart}: the atlas has {charts}, from 0", line + 1)));
         };
-        let ([x, y, z], [a, b, c]) = (found.point, found.place.weights);
-        let triangle = atlas.grid.triangle[found.place.cell as usize];
+        for x in found.point {
+            text.push_str(shortest.format(x));
+            text.push(',');
+        }
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{x:?},{y:?},{z:?},{triangle},{a:?},{b:?},{c:?},{:?}", found.off);
+        let _ = write!(text, "{},", atlas.grid.triangle[found.place.cell as usize]);
+        text.push_str(shortest.format(found.off));
+        text.push('\n');
     }
     write(&asked.output, text.as_bytes())?;
     Ok(format!("{}: {} points", escape(&asked.output), rows.len()))
 }
 
 /// Puts a file in its place, whole or not at all.
-fn write(file: &Path, bytes: &[u8]) -> Result<(), NotLifted> {
+pub(super) fn write(file: &Path, bytes: &[u8]) -> Result<(), NotLifted> {
     let above = file.parent().filter(|above| !above.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let written = System
         .open(above)

@@ -12,6 +12,7 @@ mod planar_input;
 pub mod retry;
 pub mod run;
 pub mod status;
+pub mod transfer;
 pub mod watch;
 
 use std::io::Write;

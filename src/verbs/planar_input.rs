@@ -1,6 +1,6 @@
 //! What `lift` and `transfer` are given: meshes of the planes of charts, meshes in space, and tables.
 
-use crate::formats::{self, Kind, LabelSource, READ, Source};
+use crate::formats::{self, Format, Kind, LabelSource, READ, Source};
 use crate::input::read_file;
 use crate::settings::Settings;
 use planish_core::lift::PlanarPart;
@@ -107,6 +107,42 @@ pub(super) fn read_in_space(path: &Path, settings: &Settings) -> Result<Charted,
     Ok((welded.points, triangles, charts))
 }
 
+/// A mesh as its file has it.
+pub(super) struct Whole {
+    pub points: Vec<Vec3>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Nodes in the middle of sides; empty where not all triangles have them.
+    pub middles: Vec<[u32; 3]>,
+    pub charts: Option<Vec<usize>>,
+}
+
+/// Reads a mesh in space with all of its nodes. Those of STL files, which have three for every triangle, are made one where they
+/// are at the same place.
+///
+/// # Errors
+/// What is wrong.
+pub(super) fn read_whole(path: &Path, settings: &Settings) -> Result<Whole, String> {
+    let Kind::Mesh(format) = formats::kind(path) else {
+        return Err(format!("the file name tells no mesh; name one of {READ}"));
+    };
+    if format == Format::Msh {
+        let bytes = read_file(path).map_err(|reason| reason.message)?;
+        let source = Source::alone(&bytes, &settings.limits);
+        let patches = formats::read_patches(format, &source).map_err(|e| e.reason().message)?;
+        let charts = patches.surfaces().map(|tags| tags.iter().map(chart_of_tag).collect());
+        let middles: Option<Vec<[u32; 3]>> = patches.mids().iter().copied().collect();
+        let (points, triangles) = (patches.points().to_vec(), patches.triangles().to_vec());
+        return Ok(Whole { points, triangles, middles: middles.unwrap_or_default(), charts });
+    }
+    let (points, triangles, charts) = read_in_space(path, settings)?;
+    Ok(Whole { points, triangles, middles: vec![], charts })
+}
+
+/// The chart of a surface of an MSH file.
+fn chart_of_tag(tag: &i64) -> usize {
+    tag.checked_sub(1).and_then(|chart| usize::try_from(chart).ok()).unwrap_or(usize::MAX)
+}
+
 fn read_with_charts(path: &Path, settings: &Settings) -> Result<Charted, String> {
     let Kind::Mesh(format) = formats::kind(path) else {
         return Err(format!("the file name tells no mesh; name one of {READ}"));
@@ -115,7 +151,7 @@ fn read_with_charts(path: &Path, settings: &Settings) -> Result<Charted, String>
     let plain = Source::alone(&bytes, &settings.limits);
     let patches = formats::read_patches(format, &plain).map_err(|e| e.reason().message)?;
     if let Some(surfaces) = patches.surfaces() {
-        let charts = surfaces.iter().map(|tag| usize::try_from(tag - 1).unwrap_or(usize::MAX)).collect();
+        let charts = surfaces.iter().map(chart_of_tag).collect();
         return Ok((patches.points().to_vec(), patches.triangles().to_vec(), Some(charts)));
     }
     for (array, first) in [("ref", 1), ("chart", 0)] {

@@ -5,6 +5,7 @@
 
 use super::Binary;
 use super::groups::{Group, names};
+use crate::formats::fields::Field;
 use crate::formats::made::MadeMesh;
 use planish_core::vec3::BoundingBox;
 
@@ -21,7 +22,31 @@ pub fn made(mesh: &MadeMesh) -> Vec<u8> {
     let (blocks, number) = nodes_of(mesh, &by_chart);
     out.section("Nodes", |out| nodes(out, mesh, &blocks));
     out.section("Elements", |out| elements(out, mesh, &by_chart, &number));
+    mesh.of_points.iter().for_each(|field| data(&mut out, "NodeData", field, &number));
+    // Elements are numbered chart by chart.
+    let mut tags = vec![0; mesh.triangles.len()];
+    by_chart.iter().flat_map(|(_, triangles)| triangles).zip(1..).for_each(|(t, tag)| tags[*t] = tag);
+    mesh.of_cells.iter().for_each(|field| data(&mut out, "ElementData", field, &tags));
     out.bytes
+}
+
+/// Appends an array. Views of Gmsh have 1, 3 or 9 components: others are filled with zeros.
+fn data(out: &mut Binary, section: &str, field: &Field, tags: &[usize]) {
+    let components = [1, 3, 9].into_iter().find(|c| *c >= field.components).unwrap_or(field.components);
+    // Ascending: meshio takes no others.
+    let mut entries: Vec<(usize, usize)> = tags.iter().copied().zip(0..).filter(|(tag, _)| *tag > 0).collect();
+    entries.sort_unstable();
+    let name = field.name.replace(['"', '\n'], "_");
+    out.section(section, |out| {
+        out.bytes.extend(format!("1\n\"{name}\"\n1\n0\n3\n0\n{components}\n{}\n", entries.len()).bytes());
+        for (tag, entry) in entries {
+            out.int(tag as i32);
+            for component in 0..components {
+                let is_there = component < field.components;
+                out.doubles(&[if is_there { field.number(entry * field.components + component) } else { 0.0 }]);
+            }
+        }
+    });
 }
 
 fn groups(mesh: &MadeMesh, by_chart: &[(u32, Vec<usize>)]) -> Vec<Group> {

@@ -2,6 +2,7 @@
 
 use super::appended::{Array, Grid};
 use super::vtu::names_of_labels;
+use crate::formats::fields::{Field, Values};
 use crate::formats::made::MadeMesh;
 
 /// The bytes of the file. Cells: `chart`, and where parts have names `label`, the tag of each, whose names are told beside.
@@ -10,16 +11,24 @@ pub fn made(mesh: &MadeMesh) -> Vec<u8> {
     if !mesh.parts.is_empty() {
         of_cells.push(Array::integers("label", (0..mesh.triangles.len()).map(|t| mesh.tag(t))));
     }
+    of_cells.extend(mesh.of_cells.iter().map(array));
     let grid = Grid {
         count: mesh.points.len(),
         points: Array::doubles("Points", 3, mesh.points.iter().flatten().copied()),
         cells: (0..mesh.triangles.len()).flat_map(|t| mesh.nodes(t)).collect(),
         nodes_per_cell: mesh.nodes_per_triangle(),
-        of_points: vec![],
+        of_points: mesh.of_points.iter().map(array).collect(),
         of_cells,
         field_data: names_of_labels(&mesh.parts),
     };
     grid.into_bytes()
+}
+
+fn array(field: &Field) -> Array {
+    match &field.values {
+        Values::Integers(values) => Array::whole(&field.name, field.components, values.iter().copied()),
+        Values::Floats(values) => Array::doubles(&field.name, field.components, values.iter().copied()),
+    }
 }
 
 #[cfg(test)]
