@@ -16,6 +16,7 @@ mod interop;
 mod invariants;
 mod legality;
 mod manifest;
+mod mmg;
 mod names;
 mod opening;
 mod packaging;

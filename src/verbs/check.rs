@@ -150,7 +150,7 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
     let mut found = Vec::new();
     for name in expected_files(report) {
         if !report.outputs.iter().any(|output| output.file == name) {
-            found.push(file(name, "is not listed in the report's outputs"));
+            found.push(file(&name, "is not listed in the report's outputs"));
         }
     }
     for output in &report.outputs {
@@ -160,7 +160,19 @@ fn check_outputs(folder: &Path, report: &Report) -> Vec<Finding> {
 }
 
 /// The files that a result with this report has.
-fn expected_files(report: &Report) -> Vec<&'static str> {
+fn expected_files(report: &Report) -> Vec<String> {
+    let mut expected: Vec<String> = expected_of_atlas(report).into_iter().map(str::to_owned).collect();
+    if let Some(mmg) = &report.mmg {
+        expected.extend([result_files::MMG_SURFACE, result_files::MMG_SURFACE_SIZES].map(str::to_owned));
+        expected.extend((0..mmg.charts).flat_map(result_files::mmg_chart));
+    } else if report.settings.hand_off.has(ExportTarget::Mmg) {
+        expected.push(result_files::MMG_SURFACE.to_owned());
+    }
+    expected
+}
+
+/// Those that show the atlas, and the hand-off to Gmsh.
+fn expected_of_atlas(report: &Report) -> Vec<&'static str> {
     let mut expected = REQUIRED.to_vec();
     expected.extend(report.settings.also.iter().map(|also| stages::also_file(*also)));
     let is_asked_for = report.settings.hand_off.has(ExportTarget::Gmsh);

@@ -123,12 +123,10 @@ fn joined(
         let found = planar_input::read(mesh, settings);
         parts.extend(found.map_err(|problem| NotLifted::Mesh { mesh: mesh.clone(), problem })?);
     }
+    let lifted = lift::lift(&atlas.surface, &parts, elements)?;
     let given: Vec<usize> = parts.iter().map(|part| part.chart).collect();
     let missing: Vec<usize> = (0..atlas.surface.charts()).filter(|chart| !given.contains(chart)).collect();
-    if !missing.is_empty() {
-        return Err(lift::Error::Missing { charts: missing }.into());
-    }
-    Ok(lift::lift(&atlas.surface, &parts, elements)?)
+    if missing.is_empty() { Ok(lifted) } else { Err(lift::Error::Missing { charts: missing }.into()) }
 }
 
 /// A mesh in space, its nodes moved to the nearest places; and how far the farthest was off.

@@ -154,18 +154,21 @@ fn read_with_charts(path: &Path, settings: &Settings) -> Result<Charted, String>
         let charts = surfaces.iter().map(chart_of_tag).collect();
         return Ok((patches.points().to_vec(), patches.triangles().to_vec(), Some(charts)));
     }
-    for (array, first) in [("ref", 1), ("chart", 0)] {
-        let labels = LabelSource::Array(array.to_owned());
-        // Where there is no such array the file is refused: then it tells nothing.
-        let Ok(content) = formats::read(format, &Source { labels: &labels, ..plain }) else { continue };
-        let numbers: Option<Vec<usize>> =
-            content.notes.labels.iter().map(|label| number_in(&label.name, first)).collect();
-        if let Some(numbers) = numbers.filter(|_| !content.soup.labels().is_empty()) {
-            let charts = content.soup.labels().iter().map(|label| numbers[*label as usize]).collect();
-            return Ok((content.soup.points().to_vec(), content.soup.triangles().to_vec(), Some(charts)));
-        }
-    }
-    Ok((patches.points().to_vec(), patches.triangles().to_vec(), None))
+    let (array, first) = match format {
+        Format::Medit => ("ref", 1),
+        Format::Vtk | Format::Vtu | Format::Vtp => ("chart", 0),
+        _ => return Ok((patches.points().to_vec(), patches.triangles().to_vec(), None)),
+    };
+    let labels = LabelSource::Array(array.to_owned());
+    // Where there is no such array the file is refused: then it tells nothing.
+    let labelled = formats::read(format, &Source { labels: &labels, keeps_fields: false, ..plain });
+    let charts = labelled.ok().and_then(|content| {
+        let numbers = content.notes.labels.iter().map(|label| number_in(&label.name, first));
+        let numbers = numbers.collect::<Option<Vec<usize>>>()?;
+        let of_triangles = content.soup.labels();
+        (!of_triangles.is_empty()).then(|| of_triangles.iter().map(|label| numbers[*label as usize]).collect())
+    });
+    Ok((patches.points().to_vec(), patches.triangles().to_vec(), charts))
 }
 
 /// The number at the end of a name like ref_7, counted from `first`.

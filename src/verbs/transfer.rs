@@ -5,9 +5,7 @@ use super::lift::{NotLifted, write};
 use super::planar_input;
 use super::{Exit, eprint_line, escape, say};
 use crate::cli;
-use crate::formats::{
-    self, Field, Fields, Format, LabelSource, MadeFormat, MadeMesh, Source, Values, encode_made,
-};
+use crate::formats::{self, Field, Fields, Format, LabelSource, MadeFormat, MadeMesh, Source, Values, encode_made};
 use crate::report::FieldOwner;
 use crate::settings::Settings;
 use crate::stages::guard;
@@ -73,9 +71,11 @@ fn fields(atlas: &AtlasOnDisk, settings: &Settings) -> Result<Fields, NotLifted>
         let name = field.input_name.as_ref().unwrap_or(&field.name);
         atlas.fields.iter().any(|told| told.on == on && told.name == *name)
     };
-    found.cell = found.cells.iter().find(|field| field.input_name.as_deref() == Some("cell")).map_or(vec![], |field| {
-        (0..field.values.len()).map(|at| field.number(at) as i64).collect()
-    });
+    found.cell = found
+        .cells
+        .iter()
+        .find(|field| field.input_name.as_deref() == Some("cell"))
+        .map_or(vec![], |field| (0..field.values.len()).map(|at| field.number(at) as i64).collect());
     found.points.retain(|field| is_of_input(field, FieldOwner::Points));
     found.cells.retain(|field| is_of_input(field, FieldOwner::Cells));
     for field in found.points.iter_mut().chain(&mut found.cells) {
@@ -112,9 +112,8 @@ fn placed(atlas: &AtlasOnDisk, input: planar_input::Whole) -> Result<Placed, Str
         let (place, _) = nearest.to(*x, *chart).ok_or("there is nothing to be near to")?;
         places.push(place);
     }
-    let centroid = |t: &[u32; 3]| -> Vec3 {
-        [0, 1, 2].map(|k| t.iter().map(|n| mesh.points[*n as usize][k]).sum::<f64>() / 3.0)
-    };
+    let centroid =
+        |t: &[u32; 3]| -> Vec3 { [0, 1, 2].map(|k| t.iter().map(|n| mesh.points[*n as usize][k]).sum::<f64>() / 3.0) };
     mesh.charts = match known {
         Some(charts) => charts.into_iter().map(|chart| chart as u32).collect(),
         None => {
@@ -181,7 +180,8 @@ fn of_cells(
         atlas.grid.cells.iter().map(|[a, b, c, ..]| [*a, *b, *c].map(|n| atlas.grid.points[n as usize])).collect();
     let elements: Vec<[Vec3; 3]> = mesh.triangles.iter().map(|t| t.map(|n| mesh.points[n as usize])).collect();
     let of_cells: Vec<u32> = atlas.grid.chart.iter().map(|chart| *chart as u32).collect();
-    let shares = shares(Charted { corners: &corners, charts: &of_cells }, Charted { corners: &elements, charts: &mesh.charts });
+    let shares =
+        shares(Charted { corners: &corners, charts: &of_cells }, Charted { corners: &elements, charts: &mesh.charts });
     let mut area = vec![0.0; elements.len()];
     shares.iter().for_each(|share| area[share.element as usize] += share.area);
     let overlay = Overlay { shares, area, whole: areas_of_input_cells(atlas, fields, &corners), mesh, places };

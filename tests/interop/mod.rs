@@ -7,6 +7,7 @@
 mod also;
 mod growth;
 pub mod matrix;
+mod mmg;
 pub mod naming;
 pub mod recipe;
 pub mod remesh;

@@ -26,7 +26,7 @@ fn with_tools(hook: &Hook) -> Hook {
 }
 
 /// Runs all commands to their end.
-fn ran(hooks: &[Hook], target: &Target, out: &Out) -> Account {
+pub(super) fn ran(hooks: &[Hook], target: &Target, out: &Out) -> Account {
     match hooks::run(hooks, target, out.path(), &|| true).expect("the system helps") {
         Chain::Over(account) => account,
         other => panic!("an account is expected: {other:?}"),

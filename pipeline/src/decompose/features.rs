@@ -80,7 +80,7 @@ pub(super) fn with_features<'a>(
 /// ascending.
 ///
 /// Noise makes creases, too, and ridges along them make bad elements (mmgs on max_planck: 60 below gamma 0.1 with all creases,
-/// none with these). Edges of 35 degrees along tubes that join features at their ends do so, too (thingi_1514499_needles: 3,000).
+/// 18 with these). Edges of 35 degrees along tubes that join features at their ends do so, too (thingi_1514499_needles: 3,000).
 ///
 /// ```
 /// use planish_core::monitor::NoMonitor;

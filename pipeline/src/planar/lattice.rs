@@ -2,12 +2,16 @@
 
 use super::metric::{Field, Metric};
 use crate::topology::{EdgeId, HalfEdgeId, VertexId};
+use crate::vec3::distance;
 
 /// A triangle is halved for every change of the metric by this, in the norm of logarithms: of sizes by a tenth.
 const CHANGE: f64 = 0.2;
 
 /// And no more often than so many times: the lattice of a triangle has sixteen steps.
 const FINEST: u32 = 4;
+
+/// So many steps of a lattice are as long as an edge that is asked for, at most: finer ones tell a mesher nothing.
+const STEPS_PER_EDGE: f64 = 2.0;
 
 /// A node inside a chart.
 #[derive(Clone, Copy, Debug)]
@@ -50,9 +54,16 @@ fn steps(field: &Field, face: u32) -> u32 {
             [middles[k].apart(&corners[k]), middles[k].apart(&corners[next]), middles[k].apart(&middles[next])];
         change = around.into_iter().fold(change, f64::max);
     }
-    // Over half of a side.
-    let halvings = (2.0 * change / CHANGE).max(1.0).log2().ceil().min(f64::from(FINEST));
-    1 << halvings as u32
+    // Over half of a side; and no finer than edges will be.
+    let halvings = (2.0 * change / CHANGE).min(STEPS_PER_EDGE * longest(field, face)).max(1.0).log2().ceil();
+    1 << halvings.min(f64::from(FINEST)) as u32
+}
+
+/// The longest side of a triangle in space, in sizes at its corners.
+fn longest(field: &Field, face: u32) -> f64 {
+    let corners = field.certified.chart().corners(face as usize);
+    let in_sizes = |k: usize| distance(corners[k], corners[(k + 1) % 3]) / field.size_at(corners[k]);
+    (0..3).map(in_sizes).fold(0.0, f64::max)
 }
 
 fn on_edge(field: &Field, edge: EdgeId, h: HalfEdgeId, steps: u32, nodes: &mut Vec<Node>) {

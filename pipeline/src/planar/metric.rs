@@ -127,6 +127,11 @@ impl<'a> Field<'a> {
         Self { certified, map, sizing, around }
     }
 
+    /// The length of edges that is asked for at a point of space.
+    pub fn size_at(&self, x: Vec3) -> f64 {
+        self.sizing.size_at(x)
+    }
+
     /// The metric in a triangle, at the point with these weights.
     pub fn inside(&self, face: u32, weights: [f64; 3]) -> Metric {
         let corners = self.certified.chart().corners(face as usize);
