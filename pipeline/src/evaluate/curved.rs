@@ -17,6 +17,9 @@ const INSIDE: f64 = -1e-9;
 const SHORT: f64 = 1e-13;
 const STEPS: usize = 24;
 
+/// And is given up where coordinates exceed this.
+const FAR: f64 = 1e3;
+
 /// So often a triangle is halved where Newton's method leads out of it: a part is then 1e-15 of it.
 const HALVINGS: u32 = 50;
 
@@ -269,7 +272,8 @@ impl Quadratic {
                 return Some([xi, eta]);
             }
             // Far outside, or no number: the point is not in this triangle, or is found by halving.
-            if !(xi.abs() + eta.abs() < 1e3) {
+            let far = xi.abs() + eta.abs();
+            if far.is_nan() || far > FAR {
                 return None;
             }
         }
@@ -425,7 +429,7 @@ mod tests {
                 assert_eq!((found.cell, found.side), (cell, usize::from(side)));
             }
             let outside = map.to_space([5.0, 5.0]).expect("triangles");
-            assert!(outside.distance > 3.0 && outside.weights.iter().any(|w| *w == 0.0));
+            assert!(outside.distance > 3.0 && outside.weights.contains(&0.0));
         }
         assert_eq!(CurvedMap::new(vec![], vec![], vec![]).to_space([0.0; 2]), None);
     }
