@@ -50,16 +50,21 @@ pub fn lift(asked: &cli::Lift, settings: &Settings) -> Result<Exit, Box<dyn std:
         Made::Table => lift_table(asked),
         Made::Mesh(format) => lift_meshes(asked, format, settings),
     });
-    match lifted {
+    Ok(answer(lifted, settings))
+}
+
+/// Says what was written, or why nothing was.
+pub(super) fn answer(done: Result<String, NotLifted>, settings: &Settings) -> Exit {
+    match done {
         Ok(told) => {
             if !settings.quiet {
                 say(&told);
             }
-            Ok(Exit::Success)
+            Exit::Success
         }
         Err(error) => {
             eprint_line(&format!("nothing is written: {error}"));
-            Ok(Exit::Refused)
+            Exit::Refused
         }
     }
 }

@@ -1,9 +1,9 @@
 //! `planish transfer --atlas DIR MESH -o FILE`: the fields of the input, on a new mesh.
 
 use super::atlas::AtlasOnDisk;
-use super::lift::{NotLifted, write};
+use super::lift::{NotLifted, answer, write};
 use super::planar_input;
-use super::{Exit, eprint_line, escape, say};
+use super::{Exit, escape};
 use crate::cli;
 use crate::formats::{self, Field, Fields, Format, LabelSource, MadeFormat, MadeMesh, Source, Values, encode_made};
 use crate::report::FieldOwner;
@@ -22,18 +22,7 @@ pub fn transfer(asked: &cli::Transfer, settings: &Settings) -> Result<Exit, Box<
     let format = MadeFormat::of(&asked.output).filter(|format| format.has_middles()).ok_or_else(|| {
         format!("{}: fields are written to .msh and .vtu: end the name with one of these", escape(&asked.output))
     })?;
-    match guard(|| transferred(asked, format, settings)) {
-        Ok(told) => {
-            if !settings.quiet {
-                say(&told);
-            }
-            Ok(Exit::Success)
-        }
-        Err(error) => {
-            eprint_line(&format!("nothing is written: {error}"));
-            Ok(Exit::Refused)
-        }
-    }
+    Ok(answer(guard(|| transferred(asked, format, settings)), settings))
 }
 
 /// A mesh, and where its nodes and elements are on the surface.
